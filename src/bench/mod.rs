@@ -12,6 +12,8 @@
 //! * [`scale`]: the same body and the same part of a body on more and more ranks, and what a model makes of thousands.
 //! * [`equilibrium`]: seconds to equilibrium, beside a factorisation of the same system.
 
+use std::fmt;
+
 pub mod equilibrium;
 mod grid;
 pub mod machine;
@@ -21,3 +23,11 @@ pub mod swarm;
 pub mod sweep;
 #[cfg(feature = "shm")]
 pub mod transport;
+
+/// The last line of a table of figures from a quick run: small sizes and few repetitions, to see that it runs.
+fn quick_note(quick: bool, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    if quick {
+        writeln!(f, "A quick run: it shows that the benchmark works, its times mean little.")?;
+    }
+    Ok(())
+}

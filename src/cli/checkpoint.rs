@@ -179,7 +179,8 @@ impl<'a> Checkpointer<'a> {
     /// Keeps the run as it is now, to be gone on with if it is killed. One that cannot be written does not end the run.
     pub fn keep(&mut self, folder: &mut OutputFolder, engine: (&Engine, f64), mut kept: Recorded<'_>) {
         (self.last_step, self.last) = (engine.0.step(), Instant::now());
-        if let Err(error) = self.try_to_keep(folder, engine, &mut kept) {
+        let synced = kept.frames.as_mut().map_or(Ok(()), |frames| frames.sync());
+        if let Err(error) = synced.and_then(|()| self.write(folder, engine, &kept)) {
             interrupt::leave_to_the_end();
             tracing::warn!("no checkpoint at step {}: {error}", self.last_step);
             return;
@@ -189,29 +190,6 @@ impl<'a> Checkpointer<'a> {
         self.last = Instant::now();
     }
 
-    fn try_to_keep(
-        &self,
-        folder: &mut OutputFolder,
-        engine: (&Engine, f64),
-        kept: &mut Recorded<'_>,
-    ) -> Result<(), ExportError> {
-        if let Some(frames) = &mut kept.frames {
-            frames.sync()?;
-        }
-        self.write_and_name(folder, engine, kept)
-    }
-
-    /// Before the folder takes its name: that one is never without a checkpoint.
-    fn write_and_name(
-        &self,
-        folder: &mut OutputFolder,
-        engine: (&Engine, f64),
-        kept: &Recorded<'_>,
-    ) -> Result<(), ExportError> {
-        self.write(folder, engine, kept)?;
-        interrupt::keep_unfinished(folder, resume_words)
-    }
-
     /// Leaves a checkpoint of the last step, and says whether there is one. Frames are on their way to the disk then: to wait
     /// for each would take longer than an interrupt may.
     pub fn leave(&self, folder: &mut OutputFolder, engine: (&Engine, f64), kept: &Recorded<'_>) -> bool {
@@ -219,7 +197,7 @@ impl<'a> Checkpointer<'a> {
         if self.scene.equilibrium.is_some() || !is_asked {
             return false;
         }
-        let left = self.write_and_name(folder, engine, kept);
+        let left = self.write(folder, engine, kept);
         if let Err(error) = &left {
             interrupt::leave_to_the_end();
             tracing::warn!("the run could not be resumed: {error}");
@@ -227,9 +205,10 @@ impl<'a> Checkpointer<'a> {
         left.is_ok()
     }
 
+    /// Writes it before the folder takes its name: that one is never without a checkpoint.
     fn write(
         &self,
-        folder: &OutputFolder,
+        folder: &mut OutputFolder,
         (engine, residual): (&Engine, f64),
         kept: &Recorded<'_>,
     ) -> Result<(), ExportError> {
@@ -237,7 +216,8 @@ impl<'a> Checkpointer<'a> {
         let animation = kept.animation.map(RunRecorder::animation_state);
         let recorded = (kept.snapshots, kept.probes, kept.load_steps, animation);
         let state = (EngineState::of(engine), residual);
-        Checkpoint::new(of, state, recorded, self.stepping()).write(folder.folder())
+        Checkpoint::new(of, state, recorded, self.stepping()).write(folder.folder())?;
+        interrupt::keep_unfinished(folder, resume_words)
     }
 }
 

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use flockform::continuum::run::StopReason;
 use flockform::export::comparison::{ComparisonReport, write_comparison};
-use flockform::export::report;
+use flockform::export::{Signed, report};
 use flockform::fem::Effort;
 use flockform::flock::rules::Rotation;
 use flockform::scene::Scene;
@@ -41,7 +41,7 @@ pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
         choose(open.load(None)?, &|more: &[String]| open.load_scene(more))?;
     let folder = arguments.study.output.folder(&format!("{}-compare", scene.name))?;
     let effort = Effort { target: arguments.truth_error, ..Effort::default() };
-    let mut progress = Progress::new(arguments.study.output.quiet, scene.stop.steps);
+    let progress = Progress::of_steps(arguments.study.output.quiet, scene.stop.steps);
     let compared = compare_scene(&scene, &effort, &mut |engine, residual| {
         progress.step(engine.step(), residual);
         ControlFlow::Continue(())
@@ -53,7 +53,7 @@ pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
     arguments.study.finish(
         folder,
         |folder| report::comparison::write(folder, &scene, &compared, &report),
-        || format!("{:#}\n", serde_json::json!(report)),
+        || serde_json::json!(Signed::new(&report)),
         || chosen + &words(&scene, &compared),
     )?;
     Ok(exit_code(&compared.outcome))
@@ -62,14 +62,13 @@ pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
 /// How the rule's run ended, and the table.
 fn words(scene: &Scene, compared: &Compared) -> String {
     let outcome = &compared.outcome;
-    let residual = outcome.residual;
-    let end = match &outcome.reason {
-        StopReason::Equilibrium => "at rest".to_owned(),
-        StopReason::Unsettled => format!("not at rest: the solver ended at a residual of {residual:.2e}"),
-        StopReason::Stuck(why) => format!("not {why}; the last equilibrium is compared"),
-        StopReason::Steps => format!("all steps done, residual {residual:.2e}"),
-        StopReason::Interrupted => "interrupted: compared as far as it came".to_owned(),
-        StopReason::Diverged(divergence) => format!("{divergence}; the last good state is compared"),
+    let end = &outcome.reason;
+    let more = match end {
+        StopReason::Equilibrium => String::new(),
+        StopReason::Unsettled | StopReason::Steps => format!(", residual {:.2e}", outcome.residual),
+        StopReason::Stuck(_) => "; the last equilibrium is compared".to_owned(),
+        StopReason::Interrupted => ": compared as far as it came".to_owned(),
+        StopReason::Diverged(_) => "; the last good state is compared".to_owned(),
     };
     let way = match &outcome.solved {
         Some(solved) => format!("{}, {} iterations", solved.solver, solved.iterations),
@@ -77,7 +76,7 @@ fn words(scene: &Scene, compared: &Compared) -> String {
     };
     let nodes = compared.truth.truth.nodes();
     let mut words = format!(
-        "{}: the rule by {way}, {end}; truth of the shape on {nodes} nodes\n{}",
+        "{}: the rule by {way}, {end}{more}; truth of the shape on {nodes} nodes\n{}",
         scene.name, compared.comparison
     );
     if scene.rotation() == Rotation::Corotated {

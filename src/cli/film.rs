@@ -7,9 +7,9 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use flockform::export::film::{Film, FilmColour, FilmError, FilmFile, FilmFormat, Finished};
 
-use super::interrupt;
-use super::output::OutputArguments;
-use super::progress::Drawn;
+use super::output::{OutputArguments, ReportArguments};
+use super::progress::Progress;
+use super::{Refusal, interrupt, print, say};
 
 /// A film of a body.
 #[derive(Debug, Args)]
@@ -81,22 +81,66 @@ impl AskedFilm {
     }
 
     /// Makes the film once the results stand in `kept`; `None` if an interrupt ended it.
-    pub fn make(self, film: &Film<'_>, kept: &Path, quiet: bool) -> Result<Option<Finished>, FilmError> {
+    fn make(self, film: &Film<'_>, kept: &Path, quiet: bool) -> Result<Option<Finished>, FilmError> {
         interrupt::removes([self.file.part().to_owned()]);
         interrupt::says(format!("interrupted: there is no film, the results are in {}", kept.display()));
-        let drawn = Drawn::new(quiet, "frame");
+        let progress = Progress::of_drawing(quiet, "frame");
         let show = |done: usize, of: usize| {
-            drawn.show(done, of);
+            progress.drawn(done, of);
             if interrupt::is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let made = film.write(self.file, &show);
-        drawn.finish();
+        progress.finish();
         made
     }
 }
 
-/// A film in words.
-pub fn words(film: &Finished) -> String {
+/// The end of a run or flight whose results stand in their folder.
+pub struct Finish<'a> {
+    pub kept: &'a Path,
+    pub output: &'a OutputArguments,
+    pub report: &'a ReportArguments,
+    pub is_json: bool,
+    /// Whether it was broken off.
+    pub is_interrupted: bool,
+    /// Whether an interrupt left figures out.
+    pub is_cut_short: bool,
+}
+
+impl Finish<'_> {
+    /// Makes the film that was asked for, where there are frames of it, prints JSON or words, says what is missing, and
+    /// shows the report of a whole result. Whether it is whole.
+    pub fn done(
+        self,
+        film: Option<AskedFilm>,
+        drawn: Option<Film<'_>>,
+        json: impl FnOnce() -> serde_json::Value,
+        words: impl FnOnce() -> String,
+    ) -> Result<bool, Refusal> {
+        let is_asked = film.is_some();
+        let make = |(film, drawn): (AskedFilm, Film<'_>)| film.make(&drawn, self.kept, self.output.quiet);
+        let made = film.zip(drawn).map_or(Ok(None), make)?;
+        if self.is_json {
+            print(&format!("{:#}\n", json()))?;
+        } else if !self.output.quiet {
+            say(&(words() + &made.as_ref().map_or_else(String::new, in_words)))?;
+        }
+        let missing = match (self.is_cut_short, is_asked && made.is_none()) {
+            (false, false) => None,
+            (false, true) => Some("there is no film"),
+            (true, false) => Some("figures are missing"),
+            (true, true) => Some("figures and the film are missing"),
+        };
+        missing.iter().for_each(|missing| eprintln!("interrupted: {missing}, the rest is written"));
+        let is_whole = missing.is_none() && !self.is_interrupted;
+        if is_whole {
+            self.report.show(self.kept);
+        }
+        Ok(is_whole)
+    }
+}
+
+fn in_words(film: &Finished) -> String {
     let Finished { path, frames, size: [width, height], encoder } = film;
     format!("film of {frames} frames, {width} x {height} pixels ({encoder}), in {}\n", path.display())
 }

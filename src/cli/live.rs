@@ -57,7 +57,7 @@ pub struct PageArguments {
 pub fn live(arguments: &LiveArguments) -> Result<ExitCode, Refusal> {
     let session = arguments.session()?;
     let folder = arguments.saved_in()?;
-    let (about, from) = (arguments.about(&session), folder_of(&arguments.file));
+    let (about, from) = (arguments.about(&*session), folder_of(&arguments.file));
     let server = arguments.page.server()?;
     let recording = arguments.record.open(&about, false, 1)?;
     let door = arguments.page.announce(&server)?;
@@ -67,7 +67,7 @@ pub fn live(arguments: &LiveArguments) -> Result<ExitCode, Refusal> {
     close(door);
     let session = served?;
     if let Some(recording) = recording {
-        let recorded = record(&session, &recording, from.as_deref());
+        let recorded = record(&*session, &recording, from.as_deref());
         say(&recording::close(Some(recording))?)?;
         recorded?;
     }
@@ -75,10 +75,10 @@ pub fn live(arguments: &LiveArguments) -> Result<ExitCode, Refusal> {
 }
 
 /// Records what was done: the messages of a run of the file that replays it. What was undone is not in it.
-fn record(session: &Session, recording: &Shared, folder: Option<&Path>) -> Result<(), Refusal> {
+fn record(session: &dyn Session, recording: &Shared, folder: Option<&Path>) -> Result<(), Refusal> {
     let text = session.saved().map_err(Refusal::LiveRecord)?;
     let (name, _) = session.title();
-    if let Session::Body(_) = session {
+    if session.is_body() {
         let scene = Scene::parse(name, "the session", &text, &[], folder)?;
         let mut messages = BodyMessages::new(&scene, recording.sink())?;
         let outcome = run(Plan::new(&scene)?, &mut |engine, residual| {
@@ -124,23 +124,23 @@ pub fn close(door: Option<PathBuf>) {
 }
 
 impl LiveArguments {
-    fn session(&self) -> Result<Session, Refusal> {
+    fn session(&self) -> Result<Box<dyn Session>, Refusal> {
         let (file, set, folder) = (self.file.clone(), self.set.clone(), folder_of(&self.file));
         Ok(match Kind::of_either(&file)? {
             Kind::Scene => {
                 let scene = SceneArguments { scene: file, set }.load([])?;
-                Session::Body(Box::new(Body::new(scene, folder)?))
+                Box::new(Body::new(scene, folder)?)
             }
             Kind::Swarm => {
                 let swarm = SwarmFileArguments { swarm: file, set }.load()?;
-                Session::Swarm(Box::new(Swarm::new(swarm, folder)?))
+                Box::new(Swarm::new(swarm, folder)?)
             }
         })
     }
 
     /// The description of the session for a recording, as of the command that replays it; its swarm file is known at
     /// the end.
-    fn about(&self, session: &Session) -> About {
+    fn about(&self, session: &dyn Session) -> About {
         let folder = folder_of(&self.file).and_then(|folder| std::path::absolute(folder.join(".")).ok());
         About { source: session.runner(), name: session.title().0.to_owned(), folder, ..About::default() }
     }

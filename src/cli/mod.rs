@@ -235,10 +235,11 @@ pub enum Refusal {
     #[error("{0}")]
     Checkpoint(#[from] export::checkpoint::CheckpointError),
     #[error(
-        "there is no {kinds} file and no bundled {kinds} `{name}`\n  help: the nearest bundled {kind} is `{nearest}`; see {} for all of them",
+        "there is no {kinds} file and no bundled {kinds} `{name}`\n  help: {}see {} for all of them",
+        .nearest.map_or_else(String::new, |(kind, nearest)| format!("the nearest bundled {kind} is `{nearest}`; ")),
         .kinds.lists()
     )]
-    NotBundled { kinds: names::Kinds, name: String, kind: &'static str, nearest: &'static str },
+    NotBundled { kinds: names::Kinds, name: String, nearest: Option<(&'static str, &'static str)> },
     #[error("`{name}` is a {kind}\n  help: `flockform {command} {name}`")]
     OtherKind { name: String, kind: &'static str, command: &'static str },
     #[error(

@@ -7,6 +7,7 @@ use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use flockform::continuum::memory::at_least;
 use flockform::scene::bundled::bundled_swarm;
+use flockform::scene::text::{is_path, nearest};
 use flockform::scene::{self, Bundled, Scene, SceneError, bundled};
 
 use super::{Refusal, memory};
@@ -108,11 +109,6 @@ impl Kind {
     }
 }
 
-/// Whether a word is a path rather than a name: one that is there, or looks like one.
-fn is_path(word: &str) -> bool {
-    Path::new(word).exists() || word.contains(['/', '\\', '.'])
-}
-
 /// The folder of a file, in which the files that it names are looked up; none of a bundled one.
 pub fn folder_of(word: &str) -> Option<PathBuf> {
     let is_bundled = bundled(word).is_some() || bundled_swarm(word).is_some();
@@ -121,11 +117,12 @@ pub fn folder_of(word: &str) -> Option<PathBuf> {
 
 /// The error for a word that is no name of a bundled file of these kinds.
 pub fn not_bundled(kinds: &[Kind], word: &str) -> Refusal {
-    let all = kinds.iter().flat_map(|&kind| kind.bundled().iter().map(move |one| (kind, one.name)));
-    let likeness = |name: &str| strsim::jaro_winkler(name, word);
-    let nearest = all.max_by(|(_, a), (_, b)| likeness(a).total_cmp(&likeness(b)));
-    let (kind, nearest) = nearest.unwrap_or((Kind::Scene, ""));
-    Refusal::NotBundled { kinds: Kinds(kinds.to_vec()), name: word.to_owned(), kind: kind.name(), nearest }
+    let named = |kind: Kind| kind.bundled().iter().map(|one| one.name).collect::<Vec<_>>();
+    let all: Vec<&str> = kinds.iter().flat_map(|&kind| named(kind)).collect();
+    let nearest = nearest(word, &all);
+    let kind = |name: &str| kinds.iter().find(|kind| named(**kind).contains(&name));
+    let nearest = nearest.and_then(|name| Some((kind(name)?.name(), name)));
+    Refusal::NotBundled { kinds: Kinds(kinds.to_vec()), name: word.to_owned(), nearest }
 }
 
 /// Kinds in words: `scene or swarm`.

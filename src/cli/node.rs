@@ -8,7 +8,6 @@ use clap::{Args, ValueEnum};
 use flockform::live::command::Command;
 use flockform::live::monitor::{CommandLink, Feed, Monitor};
 use flockform::live::server::Server;
-use flockform::live::session::Session;
 use flockform::messages::flockform_msgs::SetFormationRequest;
 use flockform::record::About;
 use flockform::ros::arguments::RosArguments;
@@ -236,7 +235,7 @@ impl LivePage {
             CommandLink { send: Box::new(send), answers: answered }
         });
         let (monitor, feed) = Monitor::new(swarm.clone(), link)?;
-        let (session, place) = (Session::Monitor(Box::new(monitor)), server.place());
+        let (session, place) = (Box::new(monitor), server.place());
         let command = command_line(std::env::args().skip(1));
         let serve = move || {
             if let Err(error) = server.serve(session, command, PathBuf::new(), interrupt::serves()) {

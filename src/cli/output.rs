@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use flockform::export::figures::Formats;
 use flockform::export::report::page;
 use flockform::export::shell::quoted;
@@ -74,26 +74,7 @@ fn opener(file: &Path) -> Command {
 pub struct FigureArguments {
     /// Files to draw figures as; none leaves the tables, the summary and report.html
     #[arg(long, value_name = "FORMATS", value_enum, default_value = "all")]
-    figures: Figures,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Figures {
-    None,
-    Png,
-    Svg,
-    All,
-}
-
-impl FigureArguments {
-    pub fn formats(&self) -> Formats {
-        match self.figures {
-            Figures::None => Formats::None,
-            Figures::Png => Formats::Png,
-            Figures::Svg => Formats::Svg,
-            Figures::All => Formats::All,
-        }
-    }
+    pub figures: Formats,
 }
 
 /// The folder, which an interrupt leaves nothing of.

@@ -20,7 +20,7 @@ use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
 use flockform::export::film;
 use flockform::export::memory::Outputs;
 use flockform::export::report;
-use flockform::export::{Drawing, Results, Timings, write_all};
+use flockform::export::{Drawing, Results, Signed, Timings, write_all};
 use flockform::ranks::Team;
 use flockform::record::About;
 use flockform::record::body::BodyMessages;
@@ -35,13 +35,13 @@ use recorder::{Recorder, Records};
 use words::{closing_words, where_to_look};
 
 use super::checkpoint::{CheckpointArguments, Checkpointer, ResumedRun, resume_words};
-use super::film::{BodyFilmArguments, words as film_words};
+use super::film::{BodyFilmArguments, Finish};
 use super::names::{FileName, SceneArguments, in_full};
 use super::output::{FigureArguments, OutputArguments, ReportArguments, command_line};
-use super::progress::{Drawn, Progress};
+use super::progress::Progress;
 use super::ranks::{self, Interrupted, Start};
 use super::recording::{RecordArguments, close};
-use super::{FAILED, Refusal, interrupt, memory, print, say};
+use super::{FAILED, Refusal, interrupt, memory};
 
 #[derive(Debug, Args)]
 pub struct RunArguments {
@@ -179,7 +179,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     let about = About { source: "run", name: scene.name.clone(), ..About::default() };
     let recording = arguments.record.open(&about, arguments.output.force, 1)?;
     let messages = recording.as_ref().map(|one| BodyMessages::new(&scene, one.sink())).transpose()?;
-    let progress = Progress::new(arguments.output.quiet, steps_of(&scene));
+    let progress = Progress::of_steps(arguments.output.quiet, steps_of(&scene));
     let interrupted = interrupt::keeps();
     let looks = Looks::new(&plan, shown.is_some() || messages.is_some());
     let checkpointer = Checkpointer::new(&arguments.checkpoints, (asked, &scene, digest), left.as_ref());
@@ -232,19 +232,19 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     let timings = Timings { setup, steps: elapsed.saturating_sub(on_the_way), output: writing };
     let (snapshots, probes, load_steps) = (&snapshots[..], &probes[..], &load_steps[..]);
     let results = Results { scene: &scene, outcome: &outcome, snapshots, probes, load_steps, timings };
-    let drawn = Drawn::new(arguments.output.quiet, "figure");
+    let progress = Progress::of_drawing(arguments.output.quiet, "figure");
     let is_cut_short = AtomicBool::new(false);
     let show = |done: usize, of: usize| {
-        drawn.show(done, of);
+        progress.drawn(done, of);
         if interrupt::is_raised() {
             is_cut_short.store(done < of, Ordering::Relaxed);
             return ControlFlow::Break(());
         }
         ControlFlow::Continue(())
     };
-    let drawing = Drawing { formats: arguments.figures.formats(), progress: &show };
+    let drawing = Drawing { formats: arguments.figures.figures, progress: &show };
     let (_, summary) = write_all(&folder, &results, drawing)?;
-    drawn.finish();
+    progress.finish();
     if let Some(stage) = stage {
         report::run::write(&folder, &results, &summary, stage)?;
     }
@@ -254,36 +254,25 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     if !is_interrupted {
         checkpoint::remove(&kept);
     }
-    let film = film.filter(|_| !is_interrupted).zip(animation);
-    let is_asked = film.is_some();
-    let made = film.map_or(Ok(None), |(film, animation)| {
-        let drawn = film::run::film(&scene, &outcome, &animation, film.colour);
-        film.make(&drawn, &kept, arguments.output.quiet)
-    })?;
-    if arguments.json {
-        print(&format!("{:#}\n", serde_json::json!(summary)))?;
-    } else if !arguments.output.quiet {
-        say(&words)?;
-        say(&(closing_words(&scene, &outcome, &summary, elapsed) + &where_to_look(&kept) + &recorded))?;
-        say(&made.as_ref().map_or_else(String::new, film_words))?;
-    }
-    if is_asked && made.is_none() {
-        eprintln!("interrupted: there is no film, the rest is written");
-        return Ok(ExitCode::from(FAILED));
-    }
-    if is_cut_short.into_inner() && !is_interrupted {
-        eprintln!("interrupted: figures are missing, the rest is written");
-        return Ok(ExitCode::from(FAILED));
-    }
-    if !is_interrupted {
-        arguments.report.show(&kept);
-    }
-    Ok(exit_code(&outcome))
+    let drawn = film.as_ref().filter(|_| !is_interrupted).zip(animation.as_ref());
+    let drawn = drawn.map(|(film, animation)| film::run::film(&scene, &outcome, animation, film.colour));
+    let finish = Finish {
+        kept: &kept,
+        output: &arguments.output,
+        report: &arguments.report,
+        is_json: arguments.json,
+        is_interrupted,
+        is_cut_short: is_cut_short.into_inner() && !is_interrupted,
+    };
+    let closing =
+        || words + &closing_words(&scene, &outcome, &summary, elapsed) + &where_to_look(&kept) + &recorded;
+    let is_whole = finish.done(film, drawn, || serde_json::json!(Signed::new(&summary)), closing)?;
+    Ok(if is_whole { exit_code(&outcome) } else { ExitCode::from(FAILED) })
 }
 
 impl RunArguments {
     fn outputs(&self) -> Outputs {
-        Outputs { figures: self.figures.formats(), report: !self.report.no_report }
+        Outputs { figures: self.figures.figures, report: !self.report.no_report }
     }
 
     /// The requested run, independent of the working folder.
@@ -315,10 +304,5 @@ const QUICKLY_WRITTEN: usize = 50_000;
 const WORTH_KEEPING: Duration = Duration::from_secs(5);
 
 pub fn exit_code(outcome: &Outcome) -> ExitCode {
-    match outcome.reason {
-        StopReason::Equilibrium | StopReason::Steps => ExitCode::SUCCESS,
-        StopReason::Unsettled | StopReason::Stuck(_) | StopReason::Interrupted | StopReason::Diverged(_) => {
-            ExitCode::from(FAILED)
-        }
-    }
+    if outcome.reason.is_good() { ExitCode::SUCCESS } else { ExitCode::from(FAILED) }
 }

@@ -9,7 +9,7 @@ use flockform::study::stability::bisection::Effort;
 use flockform::study::stability::extremes::plan;
 use flockform::study::stability::study::{Options, run};
 
-use super::progress::Stages;
+use super::progress::Progress;
 use super::study::StudyArguments;
 use super::{FAILED, Refusal};
 
@@ -35,15 +35,15 @@ pub fn stability(arguments: &StabilityArguments) -> Result<ExitCode, Refusal> {
     let name = scene.name;
     let folder = arguments.study.output.folder(&format!("{name}-stability"))?;
     let load = |more: &[String]| arguments.study.scene.load_scene(more);
-    let mut stages = Stages::new(arguments.study.output.quiet);
-    let study = run(&load, options, &mut |next| stages.next(next));
-    stages.finish();
+    let progress = Progress::of_stages(arguments.study.output.quiet);
+    let study = run(&load, options, &mut |next| progress.stage(next));
+    progress.finish();
     let study = study?;
     write_stability(&folder, &study)?;
     arguments.study.finish(
         folder,
         |folder| report::stability::write(folder, &study),
-        || json(&study).unwrap_or_default(),
+        || json(&study),
         || study.to_string(),
     )?;
     Ok(if study.holds() { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })

@@ -28,7 +28,7 @@ impl StudyArguments {
         &self,
         folder: OutputFolder,
         report: impl FnOnce(&OutputFolder) -> Result<PathBuf, ExportError>,
-        json: impl FnOnce() -> String,
+        json: impl FnOnce() -> serde_json::Value,
         table: impl FnOnce() -> String,
     ) -> Result<(), Refusal> {
         if !self.report.no_report {
@@ -36,7 +36,7 @@ impl StudyArguments {
         }
         let kept = interrupt::commit(folder)?;
         if self.json {
-            print(&json())?;
+            print(&format!("{:#}\n", json()))?;
         } else if !self.output.quiet {
             say(&format!("{}results in {}\n", table(), kept.display()))?;
         }

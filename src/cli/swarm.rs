@@ -19,11 +19,11 @@ use flockform::swarm::control::Control;
 use flockform::swarm::flight::{Flight, FlightReport, Record, Sample, fly_heard};
 use flockform::swarm::plan::cautions;
 
-use super::film::{SwarmFilmArguments, words as film_words};
+use super::film::{Finish, SwarmFilmArguments};
 use super::names::{FileName, Kind, folder_of};
 use super::output::{OutputArguments, ReportArguments};
 use super::recording::{RecordArguments, close};
-use super::{FAILED, Refusal, interrupt, on_terminal, print, say};
+use super::{FAILED, Refusal, interrupt, on_terminal};
 
 /// A swarm and the changes to it.
 #[derive(Debug, Args)]
@@ -116,31 +116,21 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let kept = interrupt::commit(folder)?;
     let recorded = close(recording)?;
     drop(saving);
-    let broken_off = interrupted.load(Ordering::Relaxed);
-    let is_asked = film.is_some();
-    let film = film.filter(|_| !broken_off).zip(recorder);
-    let made = film.map_or(Ok(None), |(film, recorder)| {
-        let drawn = film::flight::film(&swarm, &record, &report, &recorder, film.colour);
-        film.make(&drawn, &kept, arguments.output.quiet)
-    })?;
-    if arguments.json {
-        print(&format!("{:#}\n", serde_json::json!(report)))?;
-    } else if !arguments.output.quiet {
-        say(&(words(&report, seconds, &kept) + &recorded))?;
-        say(&made.as_ref().map_or_else(String::new, film_words))?;
-    }
-    let broken_off = broken_off || is_asked && made.is_none();
-    let missing = match (is_drawn, is_asked && made.is_none()) {
-        (true, false) => None,
-        (true, true) => Some("there is no film"),
-        (false, false) => Some("there are no figures"),
-        (false, true) => Some("there are neither figures nor a film"),
+    let is_interrupted = interrupted.load(Ordering::Relaxed);
+    let drawn = film.as_ref().filter(|_| !is_interrupted).zip(recorder.as_ref());
+    let drawn =
+        drawn.map(|(film, recorder)| film::flight::film(&swarm, &record, &report, recorder, film.colour));
+    let finish = Finish {
+        kept: &kept,
+        output: &arguments.output,
+        report: &arguments.report,
+        is_json: arguments.json,
+        is_interrupted,
+        is_cut_short: !is_drawn,
     };
-    missing.iter().for_each(|missing| eprintln!("interrupted: {missing}, the rest is written"));
-    if !broken_off {
-        arguments.report.show(&kept);
-    }
-    Ok(if report.holds() && !broken_off { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })
+    let closing = || words(&report, seconds, &kept) + &recorded;
+    let is_whole = finish.done(film, drawn, || serde_json::json!(report), closing)?;
+    Ok(if report.holds() && is_whole { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })
 }
 
 /// Flies a swarm that this control is of, and records the messages of its loop.

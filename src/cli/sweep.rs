@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use flockform::export::sweep::{
     Begun, Found, Journal, Output, Row, SweepError, SweepRequest, Table, read, write_sweep,
 };
@@ -42,7 +42,7 @@ pub struct SweepArguments {
     samples: Option<u32>,
     /// How samples are drawn
     #[arg(long, value_enum, default_value_t, requires = "samples")]
-    sampling: Sampled,
+    sampling: Sampling,
     /// Seed of the samples: the same seed draws the same runs
     #[arg(long, value_name = "S", default_value_t, requires = "samples")]
     seed: u64,
@@ -74,16 +74,6 @@ pub struct SweepArguments {
     json: bool,
 }
 
-/// How samples are drawn.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-enum Sampled {
-    /// One from each of as many equal parts of every range as there are runs
-    #[default]
-    LatinHypercube,
-    /// Independent and uniform
-    Random,
-}
-
 impl SweepArguments {
     /// Whether it is one of several that share the runs, each with a folder of its own.
     pub fn is_shard(&self) -> bool {
@@ -91,15 +81,11 @@ impl SweepArguments {
     }
 
     fn request(&self) -> Result<SweepRequest, Refusal> {
-        let sampling = match self.sampling {
-            Sampled::LatinHypercube => Sampling::LatinHypercube,
-            Sampled::Random => Sampling::Random,
-        };
         Ok(SweepRequest {
             scene: in_full(self.scene.as_deref().unwrap_or_default()),
             set: self.set.clone(),
             vary: self.vary.clone(),
-            samples: self.samples.map(|count| (count as usize, sampling, self.seed)),
+            samples: self.samples.map(|count| (count as usize, self.sampling, self.seed)),
             outputs: self.outputs.clone(),
             shard: self.shard.as_deref().map_or(Ok(Shard::WHOLE), str::parse)?,
             force: self.output.force,
@@ -172,7 +158,7 @@ impl Sweep {
             outputs: &self.request().outputs,
             rows: &self.rows,
         };
-        write_sweep(&folder, &table, arguments.figures.formats(), arguments.plot.as_deref())?;
+        write_sweep(&folder, &table, arguments.figures.figures, arguments.plot.as_deref())?;
         let json = arguments.json.then(|| table.json());
         let kept = interrupt::commit(folder)?;
         if let Some(json) = json {

@@ -8,7 +8,7 @@ use flockform::export::trade::write_trade;
 use flockform::study::trade::{Grid, run};
 
 use super::Refusal;
-use super::progress::Stages;
+use super::progress::Progress;
 use super::study::StudyArguments;
 
 #[derive(Debug, Args)]
@@ -38,15 +38,15 @@ pub fn trade(arguments: &TradeArguments) -> Result<ExitCode, Refusal> {
     let name = arguments.study.scene.load([])?.name;
     let folder = arguments.study.output.folder(&format!("{name}-trade"))?;
     let load = |more: &[String]| arguments.study.scene.load_scene(more);
-    let mut stages = Stages::new(arguments.study.output.quiet);
-    let study = run(&load, &grid, &mut |setting| stages.next(&setting.to_string()));
-    stages.finish();
+    let progress = Progress::of_stages(arguments.study.output.quiet);
+    let study = run(&load, &grid, &mut |setting| progress.stage(&setting.to_string()));
+    progress.finish();
     let study = study?;
     write_trade(&folder, &study)?;
     arguments.study.finish(
         folder,
         |folder| report::trade::write(folder, &study),
-        || format!("{:#}\n", serde_json::json!(study)),
+        || serde_json::json!(study),
         || study.to_string(),
     )?;
     Ok(ExitCode::SUCCESS)

@@ -46,6 +46,34 @@ impl StopReason {
             StopReason::Diverged(_) => "diverged",
         }
     }
+
+    /// Whether the run ended as its scene asks.
+    pub fn is_good(&self) -> bool {
+        matches!(self, StopReason::Equilibrium | StopReason::Steps)
+    }
+
+    /// What kept a stuck or diverged body from its end.
+    pub fn fault(&self) -> Option<String> {
+        match self {
+            StopReason::Stuck(why) => Some(why.clone()),
+            StopReason::Diverged(divergence) => Some(divergence.to_string()),
+            _ => None,
+        }
+    }
+}
+
+/// The end of a sentence on the run.
+impl std::fmt::Display for StopReason {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            StopReason::Equilibrium => f.write_str("in equilibrium"),
+            StopReason::Unsettled => f.write_str("the solver ended short of its tolerance"),
+            StopReason::Stuck(why) => write!(f, "not {why}"),
+            StopReason::Steps => f.write_str("all steps done"),
+            StopReason::Interrupted => f.write_str("interrupted"),
+            StopReason::Diverged(divergence) => divergence.fmt(f),
+        }
+    }
 }
 
 /// A body that ceased to be one.

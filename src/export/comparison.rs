@@ -5,10 +5,11 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use super::OutputFolder;
 use super::csv::write;
-use super::error::{ExportError, write_file};
+use super::error::ExportError;
 use super::figures::{self, Pair};
-use super::{OutputFolder, summary};
+use super::summary::write_signed;
 use crate::scene::Scene;
 use crate::scene::raw::RawScene;
 use crate::scene::units::Units;
@@ -22,10 +23,6 @@ const FILE: &str = "compare.json";
 /// The contents of `compare.json`; lengths in the scene's unit, infinities as `null`.
 #[derive(Clone, Debug, Serialize)]
 pub struct ComparisonReport {
-    /// Name of the program.
-    pub program: &'static str,
-    /// Version of the program.
-    pub version: &'static str,
     /// Short name of the scene.
     pub name: String,
     /// Title of the scene.
@@ -101,8 +98,6 @@ impl ComparisonReport {
     pub fn new(scene: &Scene, compared: &Compared) -> Self {
         let (outcome, truth) = (&compared.outcome, &compared.truth.truth);
         Self {
-            program: summary::PROGRAM,
-            version: env!("CARGO_PKG_VERSION"),
             name: scene.name.clone(),
             title: scene.raw.title.clone(),
             comparison: compared.comparison,
@@ -154,11 +149,7 @@ pub fn write_comparison(
     let stresses = figures::von_mises(&pair, &compared.von_mises_rule, &compared.von_mises_truth);
     written.extend(figures::write(&figures::overlay(&pair), folder, "overlay")?);
     written.extend(figures::write(&stresses, folder, "von_mises")?);
-    let path = folder.path(FILE);
-    let mut text = serde_json::to_string_pretty(report).map_err(ExportError::io("write", &path))?;
-    text.push('\n');
-    write_file(&path, text)?;
-    written.push(path);
+    written.push(write_signed(folder, FILE, report)?);
     Ok(written)
 }
 

@@ -98,7 +98,7 @@ pub use error::ExportError;
 use figures::{Formats, Subject};
 pub use folder::{OutputFolder, unfinished};
 pub use summary::{
-    BrokenBonds, Counts, Energies, Equilibrium, FirstBreak, Measured, Seconds, Summary, Timings,
+    BrokenBonds, Counts, Energies, Equilibrium, FirstBreak, Measured, Seconds, Signed, Summary, Timings,
 };
 pub use vtk::VtkSeries;
 

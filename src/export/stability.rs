@@ -10,7 +10,7 @@ use super::csv::write;
 use super::error::ExportError;
 use super::figures::chart::{Axis, Chart, Landmark, Series, Style, draw_below_each_other};
 use super::figures::{self, SERIES};
-use super::summary::{signed, write_signed};
+use super::summary::{Signed, write_signed};
 use crate::study::stability::bisection::Growth;
 use crate::study::stability::study::{Linear, Study, Sweep, Threshold};
 
@@ -51,11 +51,8 @@ pub fn write_stability(folder: &OutputFolder, study: &Study) -> Result<Vec<PathB
 }
 
 /// The content of `stability.json`.
-///
-/// # Errors
-/// None that a study could cause.
-pub fn json(study: &Study) -> serde_json::Result<String> {
-    signed(&Report::of(study))
+pub fn json(study: &Study) -> serde_json::Value {
+    serde_json::json!(Signed::new(&Report::of(study)))
 }
 
 impl<'a> Report<'a> {

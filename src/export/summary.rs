@@ -23,32 +23,45 @@ use crate::scene::units::Units;
 use crate::solve::equilibrium::Solved;
 
 pub(super) const PROGRAM: &str = env!("CARGO_PKG_NAME");
+pub(super) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// A report that says which program made it.
+/// A report that says which program made it: the program's name and version come first in its JSON.
 #[derive(Serialize)]
-struct Signed<'a, T> {
+pub struct Signed<'a, T> {
     program: &'static str,
     version: &'static str,
     #[serde(flatten)]
     report: &'a T,
 }
 
-/// The JSON of a report, the program's name and version before it.
-pub(super) fn signed<T: Serialize>(report: &T) -> serde_json::Result<String> {
-    let report = Signed { program: PROGRAM, version: env!("CARGO_PKG_VERSION"), report };
-    Ok(serde_json::to_string_pretty(&report)? + "\n")
+impl<'a, T> Signed<'a, T> {
+    /// This report, signed.
+    pub fn new(report: &'a T) -> Self {
+        Self { program: PROGRAM, version: VERSION, report }
+    }
 }
 
-/// Writes a report in place of a summary.
+/// Writes the JSON of a report, signed.
 pub(super) fn write_signed<T: Serialize>(
     folder: &OutputFolder,
     file: &str,
     report: &T,
 ) -> Result<PathBuf, ExportError> {
+    write_json(folder, file, &Signed::new(report))
+}
+
+/// Writes JSON for people to read as well.
+pub(super) fn write_json(
+    folder: &OutputFolder,
+    file: &str,
+    value: &impl Serialize,
+) -> Result<PathBuf, ExportError> {
     let path = folder.path(file);
-    write_file(&path, signed(report).map_err(ExportError::io("write", &path))?)?;
+    let text = serde_json::to_string_pretty(value).map_err(ExportError::io("write", &path))? + "\n";
+    write_file(&path, text)?;
     Ok(path)
 }
+
 const FILE: &str = "summary.json";
 
 /// Part of the forces on a body that may be left on a follower of one at rest \[1\].
@@ -68,10 +81,6 @@ pub struct Timings {
 /// The contents of `summary.json`; lengths in the scene's unit, infinities as `null`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
-    /// Name of the program.
-    pub program: &'static str,
-    /// Version of the program.
-    pub version: &'static str,
     /// Short name of the scene.
     pub name: String,
     /// Title of the scene.
@@ -217,15 +226,13 @@ impl Summary {
         let [pe1, pe2] = engine.energies();
         let largest_strain = largest_strain(engine);
         Self {
-            program: PROGRAM,
-            version: env!("CARGO_PKG_VERSION"),
             name: scene.name.clone(),
             title: scene.raw.title.clone(),
             counts: counts(&outcome.engine),
             steps: outcome.engine.step(),
             stop_reason: outcome.reason.name(),
             divergence: match &outcome.reason {
-                StopReason::Diverged(divergence) => Some(divergence.to_string()),
+                StopReason::Diverged(_) => outcome.reason.fault(),
                 _ => None,
             },
             residual: Some(outcome.residual).filter(|residual| residual.is_finite()),
@@ -246,11 +253,7 @@ impl Summary {
 
     /// Writes `summary.json`.
     pub fn write(&self, folder: &OutputFolder) -> Result<PathBuf, ExportError> {
-        let path = folder.path(FILE);
-        let mut text = serde_json::to_string_pretty(self).map_err(ExportError::io("write", &path))?;
-        text.push('\n');
-        write_file(&path, text)?;
-        Ok(path)
+        write_signed(folder, FILE, self)
     }
 }
 

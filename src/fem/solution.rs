@@ -104,24 +104,11 @@ impl Solution {
         self.at_places(x, y, reach, |cell, shape| shape.interpolate(&self.of_cell(cell)[..n]))
     }
 
-    /// The recovered stress of [`Solution::stress_at_points`] at each point (x, y) \[m\] of the undeformed
-    /// body, interpolated between the nodes; shape \[points\].
+    /// Stress known at the nodes, shape \[nodes\], at each point (x, y) \[m\]; points no further outside than `reach` \[m\]
+    /// take the nearest cell, continued to them.
     ///
     /// # Errors
     /// As for [`Solution::displacements_at`].
-    pub fn recovered_at(&self, x: &[f64], y: &[f64]) -> Result<Vec<Stress>, FemError> {
-        self.recovered_within(x, y, 0.0)
-    }
-
-    /// The same, where points no further outside than `reach` \[m\] take the nearest cell, continued to them.
-    ///
-    /// # Errors
-    /// As for [`Solution::displacements_at`].
-    pub fn recovered_within(&self, x: &[f64], y: &[f64], reach: f64) -> Result<Vec<Stress>, FemError> {
-        self.interpolated_within(&self.stress_at_points(), x, y, reach)
-    }
-
-    /// Stress known at the nodes, shape \[nodes\], at points; as [`Solution::recovered_within`].
     pub(crate) fn interpolated_within(
         &self,
         at_nodes: &[Stress],
@@ -172,11 +159,6 @@ impl Solution {
     /// Von Mises stress at the centre of each cell [N/m2], shape \[cells\].
     pub fn von_mises_at_cells(&self) -> Vec<f64> {
         self.stress_at_cells().iter().map(Stress::von_mises).collect()
-    }
-
-    /// Von Mises stress of [`Solution::stress_at_points`] [N/m2], shape \[nodes\].
-    pub fn von_mises_at_points(&self) -> Vec<f64> {
-        self.stress_at_points().iter().map(Stress::von_mises).collect()
     }
 
     /// Stress at a node of a cell by that cell alone; `local` is the node's number in the cell.

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::command::Command;
 use super::history::{History, Source};
-use super::session::{Broken, Frame, Refused, Viewer};
+use super::session::{Broken, Frame, Refused, Session, Viewer};
 use crate::engine::Engine;
 use crate::export::report::RunRecorder;
 use crate::export::report::view::View;
@@ -49,88 +49,10 @@ impl Body {
         &self.history.now.scene
     }
 
-    /// Changes whenever particles and neighbours are other ones.
-    pub fn layout(&self) -> u64 {
-        self.history.layout()
-    }
-
-    /// States that can be returned to.
-    pub fn undoable(&self) -> usize {
-        self.history.undoable()
-    }
-
-    /// Keys that were changed and hold now, `KEY=VALUE`, in their order.
-    pub fn sets(&self) -> Vec<String> {
-        self.history.set().iter().cloned().chain(self.history.now.changed_keys()).collect()
-    }
-
-    /// Numbers that act though the scene leaves them out, by key: damping, feedback, and the toughness of a body that can
-    /// break.
-    pub fn defaults(&self) -> Vec<(String, Value)> {
-        let engine = &self.history.now.engine;
-        let mut defaults = vec![("update.damping".to_owned(), json!(engine.update().damping))];
-        if !matches!(engine.flock().rule.mean, Mean::Material { .. }) {
-            defaults.push(("rule.feedback.factor".into(), json!(0.0)));
-        }
-        if self.can_break() {
-            defaults.push(("fracture.stretch".into(), Value::Null));
-        }
-        defaults
-    }
-
     /// Whether bonds could break past a stretch, and none has been set.
     fn can_break(&self) -> bool {
         let engine = &self.history.now.engine;
         engine.flock().bonds.as_ref().is_none_or(|bonds| bonds.threshold.is_none()) && self.takes_cuts()
-    }
-
-    /// Whether it has bonds that can be cut.
-    pub fn takes_cuts(&self) -> bool {
-        let engine = &self.history.now.engine;
-        engine.lasting_neighbours().is_some() && !matches!(engine.flock().rule.mean, Mean::Material { .. })
-    }
-
-    /// Whether a side can be loaded by hand: stress takes a material.
-    pub fn takes_loads(&self) -> bool {
-        self.scene().material.is_some()
-    }
-
-    /// Takes a step.
-    ///
-    /// # Errors
-    /// Why it was taken back.
-    pub fn advance(&mut self) -> Result<(), String> {
-        let state = &mut self.history.now;
-        for grab in state.grabs.values_mut() {
-            grab.hold(&mut state.engine);
-        }
-        state.engine.advance();
-        match state.bounds.divergence(&state.engine) {
-            None => Ok(()),
-            Some(divergence) => {
-                state.engine.undo_step();
-                Err(divergence.to_string())
-            }
-        }
-    }
-
-    /// Does what a viewer asks of a body.
-    ///
-    /// # Errors
-    /// Why it cannot be done; nothing has changed then.
-    pub fn perform(&mut self, viewer: Viewer, command: &Command) -> Result<(), Refused> {
-        match command {
-            Command::Grab { particle, alone } => self.grab(viewer, *particle, *alone),
-            Command::Drag { by } => self.drag(viewer, *by),
-            Command::Release {} => {
-                self.release(viewer);
-                Ok(())
-            }
-            Command::Cut { from, to } => self.cut((*from, *to)),
-            Command::Load { side, by } => self.load(*side, *by),
-            Command::Set { key, value } => self.set(&format!("{key}={value}")),
-            other => self.history.perform(other),
-        }
     }
 
     fn grab(&mut self, viewer: Viewer, particle: usize, alone: bool) -> Result<(), Refused> {
@@ -153,11 +75,6 @@ impl Body {
         let grab = self.history.now.grabs.get_mut(&viewer).ok_or("nothing is held")?;
         grab.by = by.map(|along| along.clamp(-farthest, farthest));
         self.history.now.require_room(0)
-    }
-
-    /// Lets go of what a viewer holds, if it holds anything.
-    pub fn release(&mut self, viewer: Viewer) {
-        self.history.now.let_go(viewer);
     }
 
     fn cut(&mut self, cut: ([f64; 2], [f64; 2])) -> Result<(), Refused> {
@@ -209,11 +126,49 @@ impl Body {
         Ok(())
     }
 
-    /// The scene that replays what was done, as TOML.
-    ///
-    /// # Errors
-    /// A scene that cannot be written, or that no run would take.
-    pub fn saved(&self) -> Result<String, String> {
+    /// Whether it has bonds that can be cut.
+    fn takes_cuts(&self) -> bool {
+        let engine = &self.history.now.engine;
+        engine.lasting_neighbours().is_some() && !matches!(engine.flock().rule.mean, Mean::Material { .. })
+    }
+}
+
+impl Session for Body {
+    fn advance(&mut self) -> Result<(), String> {
+        let state = &mut self.history.now;
+        for grab in state.grabs.values_mut() {
+            grab.hold(&mut state.engine);
+        }
+        state.engine.advance();
+        match state.bounds.divergence(&state.engine) {
+            None => Ok(()),
+            Some(divergence) => {
+                state.engine.undo_step();
+                Err(divergence.to_string())
+            }
+        }
+    }
+
+    fn perform(&mut self, viewer: Viewer, command: &Command) -> Result<(), Refused> {
+        match command {
+            Command::Grab { particle, alone } => self.grab(viewer, *particle, *alone),
+            Command::Drag { by } => self.drag(viewer, *by),
+            Command::Release {} => {
+                self.release(viewer);
+                Ok(())
+            }
+            Command::Cut { from, to } => self.cut((*from, *to)),
+            Command::Load { side, by } => self.load(*side, *by),
+            Command::Set { key, value } => self.set(&format!("{key}={value}")),
+            other => self.history.perform(other),
+        }
+    }
+
+    fn release(&mut self, viewer: Viewer) {
+        self.history.now.let_go(viewer);
+    }
+
+    fn saved(&self) -> Result<String, String> {
         let raw = self.history.now.replay();
         let text = toml::to_string(&raw).map_err(|error| error.to_string())?;
         match Scene::parse("saved", "saved.toml", &text, &[], self.history.source.folder.as_deref()) {
@@ -222,21 +177,7 @@ impl Body {
         }
     }
 
-    /// The page's view of the body as it is.
-    pub fn view(&self) -> View {
-        RunRecorder::still(&self.history.now.scene, &self.history.now.engine)
-    }
-
-    /// Quantities that the page cannot compute from displacements.
-    pub fn channels(&self) -> Vec<&'static str> {
-        match self.history.now.engine.lasting_neighbours() {
-            Some(_) => vec!["pe2"],
-            None => vec!["pe2", "pe1", "strain"],
-        }
-    }
-
-    /// The state of every particle; of the channels those that are wanted.
-    pub fn frame(&self, wanted: &[bool]) -> Frame {
+    fn frame(&self, wanted: &[bool]) -> Frame {
         let engine = &self.history.now.engine;
         let (present, reference) = (engine.present(), &engine.body().reference);
         let moved = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(n, t)| (n - t) as f32).collect();
@@ -254,8 +195,73 @@ impl Body {
         Frame { clock: engine.step() as f64, places, channels }
     }
 
-    /// Broken bonds, as the page's view knows them.
-    pub fn broken(&self) -> Broken {
+    fn channels(&self) -> Vec<&'static str> {
+        match self.history.now.engine.lasting_neighbours() {
+            Some(_) => vec!["pe2"],
+            None => vec!["pe2", "pe1", "strain"],
+        }
+    }
+
+    fn roles(&self) -> Vec<u8> {
+        self.engine().roles().iter().map(|role| role.number()).collect()
+    }
+
+    fn broken(&self) -> Broken {
         self.history.now.engine.breaks().iter().map(|one| one.pair).collect()
+    }
+
+    fn layout(&self) -> u64 {
+        self.history.layout()
+    }
+
+    fn undoable(&self) -> usize {
+        self.history.undoable()
+    }
+
+    fn sets(&self) -> Vec<String> {
+        self.history.set().iter().cloned().chain(self.history.now.changed_keys()).collect()
+    }
+
+    fn defaults(&self) -> Vec<(String, Value)> {
+        let engine = &self.history.now.engine;
+        let mut defaults = vec![("update.damping".to_owned(), json!(engine.update().damping))];
+        if !matches!(engine.flock().rule.mean, Mean::Material { .. }) {
+            defaults.push(("rule.feedback.factor".into(), json!(0.0)));
+        }
+        if self.can_break() {
+            defaults.push(("fracture.stretch".into(), Value::Null));
+        }
+        defaults
+    }
+
+    fn tools(&self) -> Vec<&'static str> {
+        // A side can be loaded where there is stress, which takes a material.
+        let tools = [("cut", self.takes_cuts()), ("load", self.scene().material.is_some())];
+        tools.into_iter().filter(|(_, is)| *is).map(|(name, _)| name).collect()
+    }
+
+    fn rate(&self) -> f64 {
+        // As fast as screens are drawn.
+        60.0
+    }
+
+    fn view(&self) -> View {
+        RunRecorder::still(&self.history.now.scene, &self.history.now.engine)
+    }
+
+    fn title(&self) -> (&str, &str) {
+        (&self.scene().name, &self.scene().raw.title)
+    }
+
+    fn runner(&self) -> &'static str {
+        "run"
+    }
+
+    fn is_body(&self) -> bool {
+        true
+    }
+
+    fn raw(&self) -> Value {
+        serde_json::to_value(&self.scene().raw).unwrap_or_default()
     }
 }

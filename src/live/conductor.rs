@@ -40,7 +40,7 @@ pub enum Request {
 
 /// A session and how it goes on.
 pub struct Conductor {
-    session: Session,
+    session: Box<dyn Session>,
     board: Arc<Board>,
     /// The command that began the session.
     command: String,
@@ -92,7 +92,7 @@ impl Pace {
 
 impl Conductor {
     /// A session that stands still, begun by `command`, whose files are saved in `folder`.
-    pub fn new(session: Session, board: Arc<Board>, command: String, folder: PathBuf) -> Self {
+    pub fn new(session: Box<dyn Session>, board: Arc<Board>, command: String, folder: PathBuf) -> Self {
         let pace = Pace { since: Instant::now(), steps: 0, frames: 0, rates: [0.0; 2] };
         Self {
             session,
@@ -113,14 +113,14 @@ impl Conductor {
     }
 
     /// Goes on until `stop` is raised or no viewer can ask for anything any more, and returns the session.
-    pub fn run(mut self, requests: &Receiver<Request>, stop: &AtomicBool) -> Session {
+    pub fn run(mut self, requests: &Receiver<Request>, stop: &AtomicBool) -> Box<dyn Session> {
         let _closed = Closed(Arc::clone(&self.board));
         // Kept on a grid of times: what a frame is late by would otherwise come on top of each.
         let mut next = Instant::now();
         let mut before = Instant::now();
         let mut is_news = false;
         while !stop.load(Ordering::Relaxed) {
-            if let Session::Monitor(_) = self.session {
+            if self.session.monitor().is_some() {
                 // It goes on by itself; the question is whether a viewer follows it.
                 self.is_playing = self.board.viewers() > 0;
             }
@@ -149,7 +149,7 @@ impl Conductor {
 
     /// Takes the steps that are due after so many seconds; whether there were any.
     fn play(&mut self, seconds: f64) -> bool {
-        if let Session::Monitor(monitor) = &mut self.session {
+        if let Some(monitor) = self.session.monitor_mut() {
             for (viewer, answer) in monitor.answers() {
                 self.board.send(viewer, &answered(answer));
             }
@@ -199,7 +199,7 @@ impl Conductor {
     }
 
     fn perform(&mut self, viewer: Viewer, command: &Command) -> bool {
-        let is_stepped_elsewhere = matches!(self.session, Session::Monitor(_));
+        let is_stepped_elsewhere = self.session.monitor().is_some();
         match command {
             Command::Ask { quantity } => self.board.want(viewer, quantity.clone()),
             Command::Drawn { .. } => return false,
@@ -307,22 +307,22 @@ impl Conductor {
             "tools": self.session.tools(),
             "viewers": self.board.viewers(),
             "rates": self.pace.rates,
-            "node": self.monitor().map(Monitor::status),
+            "node": self.session.monitor().map(Monitor::status),
         })
     }
 
     fn page(&self) -> String {
         let (_, title) = self.session.title();
-        let node = self.monitor().map(
+        let node = self.session.monitor().map(
             |monitor| json!({ "commands": monitor.takes_commands(), "manoeuvres": monitor.manoeuvres() }),
         );
         let live = json!({
             "channels": self.session.channels(),
             "layout": self.session.layout(),
             "keys": if node.is_some() { Vec::new() } else { self.keys() },
-            "swarm": !matches!(self.session, Session::Body(_)),
+            "swarm": !self.session.is_body(),
             "node": node,
-            "design": self.session.design(),
+            "design": self.session.exactness(),
         });
         live_page(self.command(), title.to_owned(), self.session.view(), live)
     }
@@ -343,10 +343,6 @@ impl Conductor {
         let is_new = |(key, _): &(String, Value)| !written.iter().any(|(known, _)| known == key);
         let defaults: Vec<_> = self.session.defaults().into_iter().filter(is_new).collect();
         written.into_iter().chain(defaults).collect()
-    }
-
-    fn monitor(&self) -> Option<&Monitor> {
-        if let Session::Monitor(monitor) = &self.session { Some(monitor) } else { None }
     }
 }
 

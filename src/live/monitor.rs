@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use super::command::Command;
-use super::session::{Frame, Refused, Viewer};
+use super::session::{Frame, Refused, Session, Viewer};
 use super::swarm;
 use crate::export::report::FlightRecorder;
 use crate::export::report::view::View;
@@ -103,16 +103,6 @@ impl Monitor {
         self.commands.iter().flat_map(|link| link.answers.try_iter())
     }
 
-    /// Sends a command to the loop.
-    ///
-    /// # Errors
-    /// The reason why it was not sent.
-    pub fn perform(&self, viewer: Viewer, command: &Command) -> Result<(), Refused> {
-        let link = self.commands.as_ref();
-        let link = link.ok_or("this view is for reading alone: start the node with --allow-commands")?;
-        (link.send)(viewer, command)
-    }
-
     /// The swarm that is flown.
     pub fn swarm(&self) -> &File {
         &self.file
@@ -145,42 +135,71 @@ impl Monitor {
             "shear": posture.shear,
         })
     }
+}
 
-    /// The page's view of the robots as they are.
-    pub fn view(&self) -> View {
-        FlightRecorder::still(&self.file, &self.control, &self.control.last_places())
+impl Session for Monitor {
+    fn perform(&mut self, viewer: Viewer, command: &Command) -> Result<(), Refused> {
+        let link = self.commands.as_ref();
+        let link = link.ok_or("this view is for reading alone: start the node with --allow-commands")?;
+        (link.send)(viewer, command)
     }
 
-    /// The state of every robot, with all channels; the clock is that of the leaders' programs.
-    pub fn frame(&self) -> Frame {
+    fn saved(&self) -> Result<String, String> {
+        Err("what a node flies is kept by --record".into())
+    }
+
+    /// The clock is that of the leaders' programs.
+    fn frame(&self, _wanted: &[bool]) -> Frame {
         let mut clearance = Vec::new();
         self.control.clearance(&mut clearance);
         swarm::frame(&self.control, &self.control.last_places(), &clearance, self.control.program_time())
     }
 
-    /// Roles by number.
-    pub fn roles(&self) -> Vec<u8> {
+    fn roles(&self) -> Vec<u8> {
         swarm::roles(&self.control)
     }
 
-    /// A silent loop and the bounds that are broken, in words, and the robots that break them.
-    pub fn alarms(&self) -> (Vec<String>, Vec<usize>) {
+    /// A silent loop too.
+    fn alarms(&self) -> (Vec<String>, Vec<usize>) {
         let alarms = Alarm::of_poses(&self.file, &self.control);
         let (words, robots) = swarm::in_words(&alarms, &self.control.formation().names);
         let silent = "the control loop has sent no state for more than 1 s: what is shown is old".to_owned();
         (self.is_silent.then_some(silent).into_iter().chain(words).collect(), robots)
     }
 
-    /// How far each obstacle is from its place in the file \[m\].
-    pub fn obstacles(&self) -> Vec<[f64; 2]> {
+    fn obstacles(&self) -> Vec<[f64; 2]> {
         self.control.filter().obstacles().moved().collect()
     }
 
     /// Robots without a usable pose, and what is known of it.
-    pub fn faults(&self) -> Vec<(usize, &'static str)> {
+    fn faults(&self) -> Vec<(usize, &'static str)> {
         let health = |m: usize| self.control.health(m);
         let count = self.control.formation().count();
         (0..count).filter(|&m| !health(m).is_usable()).map(|m| (m, health(m).name())).collect()
+    }
+
+    fn view(&self) -> View {
+        FlightRecorder::still(&self.file, &self.control, &self.control.last_places())
+    }
+
+    fn title(&self) -> (&str, &str) {
+        (&self.file.name, &self.file.raw.title)
+    }
+
+    fn runner(&self) -> &'static str {
+        "node"
+    }
+
+    fn raw(&self) -> Value {
+        serde_json::to_value(&self.file.raw).unwrap_or_default()
+    }
+
+    fn monitor(&self) -> Option<&Monitor> {
+        Some(self)
+    }
+
+    fn monitor_mut(&mut self) -> Option<&mut Monitor> {
+        Some(self)
     }
 }
 

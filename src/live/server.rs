@@ -79,11 +79,11 @@ impl Server {
     /// A listener that is gone, no threads, or a session that has panicked.
     pub fn serve(
         self,
-        session: Session,
+        session: Box<dyn Session>,
         command: String,
         folder: PathBuf,
         stop: &AtomicBool,
-    ) -> io::Result<Session> {
+    ) -> io::Result<Box<dyn Session>> {
         self.listener.set_nonblocking(true)?;
         let board = Arc::new(Board::default());
         let (requests, asked) = sync_channel(MOST_REQUESTS);

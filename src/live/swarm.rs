@@ -5,9 +5,11 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use serde_json::Value;
+
 use super::command::{Command, Fault};
 use super::history::{self, History, Source};
-use super::session::{Frame, Refused, Viewer};
+use super::session::{Frame, Refused, Session, Viewer};
 use crate::export::report::flight::{FlightRecorder, from_places};
 use crate::export::report::view::View;
 use crate::flock::role::Role;
@@ -83,64 +85,6 @@ impl Swarm {
         &self.history.now.file
     }
 
-    /// Time of a period \[s\].
-    pub fn period(&self) -> f64 {
-        self.history.now.flight.control().period()
-    }
-
-    /// Changes whenever the robots are other ones.
-    pub fn layout(&self) -> u64 {
-        self.history.layout()
-    }
-
-    /// States that can be returned to.
-    pub fn undoable(&self) -> usize {
-        self.history.undoable()
-    }
-
-    /// Keys that were changed and hold now, `KEY=VALUE`, in their order.
-    pub fn sets(&self) -> Vec<String> {
-        let (noise, delay, loss) = self.history.now.channel;
-        let values = [noise.to_string(), delay.to_string(), loss.to_string()];
-        let raw = &self.history.now.file.raw.flight;
-        let is_changed = [noise != raw.noise, delay != raw.delay, loss != raw.loss];
-        let channel = CHANNEL_KEYS.iter().zip(values).zip(is_changed).filter(|(_, is_changed)| *is_changed);
-        let channel = channel.map(|((key, value), _)| format!("{key}={value}"));
-        self.history.set().iter().cloned().chain(channel).collect()
-    }
-
-    /// Flies a period.
-    pub fn advance(&mut self) {
-        let State { file, flight, alarms, .. } = &mut self.history.now;
-        let before = flight.fleet().places();
-        flight.step();
-        *alarms = Alarm::now(file, flight, &before);
-    }
-
-    /// Does what a viewer asks of a swarm.
-    ///
-    /// # Errors
-    /// Why it cannot be done; nothing has changed then.
-    pub fn perform(&mut self, viewer: Viewer, command: &Command) -> Result<(), Refused> {
-        match command {
-            Command::Grab { particle, alone } => self.grab(viewer, *particle, *alone),
-            Command::GrabObstacle { obstacle } => self.grab_obstacle(viewer, *obstacle),
-            Command::Drag { by } => self.drag(viewer, *by),
-            Command::Squeeze { by } => self.squeeze(viewer, *by),
-            Command::Release {} => {
-                self.release(viewer);
-                Ok(())
-            }
-            Command::Set { key, value } if CHANNEL_KEYS.contains(&key.trim()) => {
-                self.channel(key.trim(), value)
-            }
-            Command::Set { key, value } => self.history.restart(&[format!("{key}={value}")]),
-            Command::Fault { robot, what } => self.fault(*robot, *what),
-            Command::Design { edit } => self.design(edit),
-            other => self.history.perform(other),
-        }
-    }
-
     /// The change is made in the file that was designed last, and what was flown since is left behind.
     fn design(&mut self, edit: &Edit) -> Result<(), Refused> {
         let State { file, flight, .. } = &self.history.now;
@@ -205,11 +149,6 @@ impl Swarm {
         now.lead_all(&leaders, |place| [0, 1].map(|k| middle[k] + by[k] * (place[k] - middle[k])))
     }
 
-    /// Lets go of what a viewer holds: it stays where it was led to.
-    pub fn release(&mut self, viewer: Viewer) {
-        self.history.now.hands.remove(&viewer);
-    }
-
     fn channel(&mut self, key: &str, value: &str) -> Result<(), Refused> {
         let set = [self.history.set(), &[format!("{key}={value}")]].concat();
         let Source { file, folder } = &*self.history.source;
@@ -248,12 +187,42 @@ impl Swarm {
         }
         Ok(())
     }
+}
 
-    /// The swarm file that flies it again, as TOML.
-    ///
-    /// # Errors
-    /// A swarm that cannot be written.
-    pub fn saved(&self) -> Result<String, String> {
+impl Session for Swarm {
+    fn advance(&mut self) -> Result<(), String> {
+        let State { file, flight, alarms, .. } = &mut self.history.now;
+        let before = flight.fleet().places();
+        flight.step();
+        *alarms = Alarm::now(file, flight, &before);
+        Ok(())
+    }
+
+    fn perform(&mut self, viewer: Viewer, command: &Command) -> Result<(), Refused> {
+        match command {
+            Command::Grab { particle, alone } => self.grab(viewer, *particle, *alone),
+            Command::GrabObstacle { obstacle } => self.grab_obstacle(viewer, *obstacle),
+            Command::Drag { by } => self.drag(viewer, *by),
+            Command::Squeeze { by } => self.squeeze(viewer, *by),
+            Command::Release {} => {
+                self.release(viewer);
+                Ok(())
+            }
+            Command::Set { key, value } if CHANNEL_KEYS.contains(&key.trim()) => {
+                self.channel(key.trim(), value)
+            }
+            Command::Set { key, value } => self.history.restart(&[format!("{key}={value}")]),
+            Command::Fault { robot, what } => self.fault(*robot, *what),
+            Command::Design { edit } => self.design(edit),
+            other => self.history.perform(other),
+        }
+    }
+
+    fn release(&mut self, viewer: Viewer) {
+        self.history.now.hands.remove(&viewer);
+    }
+
+    fn saved(&self) -> Result<String, String> {
         let mut raw = self.history.now.file.raw.clone();
         // Before a period the hand acted first: the file's own commands are performed when it begins.
         let own = std::mem::replace(&mut raw.flight.commands, self.history.now.commands.clone());
@@ -268,8 +237,54 @@ impl Swarm {
         toml::to_string(&raw).map_err(|error| error.to_string())
     }
 
-    /// How exactly followers keep to the leaders' motion, in words; `None` where the formation is that of a scene.
-    pub fn exactness(&self) -> Option<Vec<String>> {
+    fn frame(&self, _wanted: &[bool]) -> Frame {
+        let (control, fleet) = (self.flight().control(), self.flight().fleet());
+        let (places, mut clearance) = (fleet.places(), Vec::new());
+        control.filter().clearance(&places, &mut clearance);
+        frame(control, &places, &clearance, fleet.time())
+    }
+
+    fn roles(&self) -> Vec<u8> {
+        roles(self.flight().control())
+    }
+
+    fn layout(&self) -> u64 {
+        self.history.layout()
+    }
+
+    fn undoable(&self) -> usize {
+        self.history.undoable()
+    }
+
+    fn sets(&self) -> Vec<String> {
+        let (noise, delay, loss) = self.history.now.channel;
+        let values = [noise.to_string(), delay.to_string(), loss.to_string()];
+        let raw = &self.history.now.file.raw.flight;
+        let is_changed = [noise != raw.noise, delay != raw.delay, loss != raw.loss];
+        let channel = CHANNEL_KEYS.iter().zip(values).zip(is_changed).filter(|(_, is_changed)| *is_changed);
+        let channel = channel.map(|((key, value), _)| format!("{key}={value}"));
+        self.history.set().iter().cloned().chain(channel).collect()
+    }
+
+    fn rate(&self) -> f64 {
+        1.0 / self.flight().control().period()
+    }
+
+    fn alarms(&self) -> (Vec<String>, Vec<usize>) {
+        in_words(&self.history.now.alarms, &self.flight().control().formation().names)
+    }
+
+    fn obstacles(&self) -> Vec<[f64; 2]> {
+        self.history.now.flight.control().filter().obstacles().moved().collect()
+    }
+
+    fn faults(&self) -> Vec<(usize, &'static str)> {
+        let fleet = self.history.now.flight.fleet();
+        let count = fleet.robots().len();
+        (0..count).filter_map(|m| Some((m, fleet.fault_name(m)?))).collect()
+    }
+
+    fn exactness(&self) -> Option<Vec<String>> {
         let formation = self.flight().control().formation();
         let exactness = Exactness::of(self.swarm(), formation).map(|exactness| exactness.in_words());
         let unknown =
@@ -277,40 +292,21 @@ impl Swarm {
         formation.is_led_here().then(|| exactness.unwrap_or_else(unknown))
     }
 
-    /// The page's view of the robots as they are.
-    pub fn view(&self) -> View {
+    fn view(&self) -> View {
         let State { file, flight, .. } = &self.history.now;
         FlightRecorder::still(file, flight.control(), &flight.fleet().places())
     }
 
-    /// The state of every robot, with all channels.
-    pub fn frame(&self) -> Frame {
-        let (control, fleet) = (self.flight().control(), self.flight().fleet());
-        let (places, mut clearance) = (fleet.places(), Vec::new());
-        control.filter().clearance(&places, &mut clearance);
-        frame(control, &places, &clearance, fleet.time())
+    fn title(&self) -> (&str, &str) {
+        (&self.swarm().name, &self.swarm().raw.title)
     }
 
-    /// Roles by number.
-    pub fn roles(&self) -> Vec<u8> {
-        roles(self.flight().control())
+    fn runner(&self) -> &'static str {
+        "swarm"
     }
 
-    /// How far each obstacle is from its place in the file \[m\].
-    pub fn obstacles(&self) -> Vec<[f64; 2]> {
-        self.history.now.flight.control().filter().obstacles().moved().collect()
-    }
-
-    /// Bounds that are broken, in words, and the robots that break them.
-    pub fn alarms(&self) -> (Vec<String>, Vec<usize>) {
-        in_words(&self.history.now.alarms, &self.flight().control().formation().names)
-    }
-
-    /// Robots with a fault now, and its kind.
-    pub fn faults(&self) -> Vec<(usize, &'static str)> {
-        let fleet = self.history.now.flight.fleet();
-        let count = fleet.robots().len();
-        (0..count).filter_map(|m| Some((m, fleet.fault_name(m)?))).collect()
+    fn raw(&self) -> Value {
+        serde_json::to_value(&self.swarm().raw).unwrap_or_default()
     }
 }
 

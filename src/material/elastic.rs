@@ -185,11 +185,6 @@ impl Elastic {
         self.stiffness.cholesky().map_or([f64::NAN; 3], |factor| factor.solve(&forces).into())
     }
 
-    /// Whether the material is the same in every direction.
-    pub fn is_isotropic(&self) -> bool {
-        matches!(self.constants, Constants::Isotropic { .. })
-    }
-
     /// Von Mises stress \[force / length^2\] under a strain (xx, yy, engineering xy) \[1\]; in plane strain
     /// with the stress across the thickness that keeps the faces from parting.
     pub fn von_mises(&self, strain: [f64; 3]) -> f64 {

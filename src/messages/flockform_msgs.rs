@@ -2,9 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ServiceType;
 use super::geometry_msgs::{Point, Vector3};
 use super::std_msgs::Header;
+use super::{messages, service};
+use crate::swarm::control::Mode;
+use crate::swarm::safety::Flags;
+use crate::swarm::watch::Health;
 
 /// The state of one member, as the formation's node knows it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -42,21 +45,21 @@ impl MemberState {
     pub const LEADER: u8 = 0;
     pub const FOLLOWER: u8 = 1;
 
-    pub const WAITING: u8 = 0;
-    pub const FRESH: u8 = 1;
-    pub const HELD: u8 = 2;
-    pub const DEGRADED: u8 = 3;
-    pub const STOPPED: u8 = 4;
+    pub const WAITING: u8 = Health::Waiting.number();
+    pub const FRESH: u8 = Health::Fresh.number();
+    pub const HELD: u8 = Health::Held.number();
+    pub const DEGRADED: u8 = Health::Degraded.number();
+    pub const STOPPED: u8 = Health::Stopped.number();
 
-    pub const SPEED_LIMITED: u32 = 1;
-    pub const ACCELERATION_LIMITED: u32 = 2;
-    pub const GEOFENCED: u32 = 4;
-    pub const SEPARATED: u32 = 8;
-    pub const OBSTRUCTED: u32 = 16;
-    pub const RESOLVING_DEADLOCK: u32 = 32;
-    pub const NEIGHBOUR_LOST: u32 = 64;
-    pub const TRIMMED: u32 = 128;
-    pub const POSE_REJECTED: u32 = 256;
+    pub const SPEED_LIMITED: u32 = Flags::SPEED_LIMITED;
+    pub const ACCELERATION_LIMITED: u32 = Flags::ACCELERATION_LIMITED;
+    pub const GEOFENCED: u32 = Flags::GEOFENCED;
+    pub const SEPARATED: u32 = Flags::SEPARATED;
+    pub const OBSTRUCTED: u32 = Flags::OBSTRUCTED;
+    pub const RESOLVING_DEADLOCK: u32 = Flags::RESOLVING_DEADLOCK;
+    pub const NEIGHBOUR_LOST: u32 = Flags::NEIGHBOUR_LOST;
+    pub const TRIMMED: u32 = Flags::TRIMMED;
+    pub const POSE_REJECTED: u32 = Flags::POSE_REJECTED;
 }
 
 /// How a formation is, once a tick.
@@ -81,10 +84,10 @@ pub struct FormationState {
 }
 
 impl FormationState {
-    pub const RUNNING: u8 = 0;
+    pub const RUNNING: u8 = Mode::Running.number();
     pub const HOLDING: u8 = 1;
-    pub const EMERGENCY_STOPPED: u8 = 2;
-    pub const INACTIVE: u8 = 3;
+    pub const EMERGENCY_STOPPED: u8 = Mode::EmergencyStopped.number();
+    pub const INACTIVE: u8 = Mode::Inactive.number();
 }
 
 /// The inputs of a formation's loop besides poses, and its ticks: for recordings.
@@ -119,7 +122,7 @@ pub struct Ranges {
     pub distances: Vec<f64>,
 }
 
-super::messages!("flockform_msgs": MemberState, FormationState, LoopEvent, Ranges);
+messages!("flockform_msgs": MemberState, FormationState, LoopEvent, Ranges);
 
 /// Request of the service `SetFormation`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -145,12 +148,7 @@ pub struct SetFormationResponse {
     pub message: String,
 }
 
-/// `srv/SetFormation`: moves the leaders.
-pub struct SetFormation;
-
-impl ServiceType for SetFormation {
-    const PACKAGE: &str = "flockform_msgs";
-    const NAME: &str = "SetFormation";
-    type Request = SetFormationRequest;
-    type Response = SetFormationResponse;
-}
+service!(
+    /// Moves the leaders.
+    SetFormation, "flockform_msgs", SetFormationRequest => SetFormationResponse
+);

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::std_msgs::Empty;
-use super::{Message, ServiceType};
+use super::{Message, service};
 
 /// `msg/State`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -42,8 +42,7 @@ impl Message for TransitionEvent {
     const NAME: &str = "TransitionEvent";
 }
 
-/// `srv/ChangeState`.
-pub struct ChangeState;
+service!(ChangeState, "lifecycle_msgs", ChangeStateRequest => ChangeStateResponse);
 
 /// Request of [`ChangeState`]; where the id is 0 and a label is given, the label counts.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -57,15 +56,7 @@ pub struct ChangeStateResponse {
     pub success: bool,
 }
 
-impl ServiceType for ChangeState {
-    const PACKAGE: &str = "lifecycle_msgs";
-    const NAME: &str = "ChangeState";
-    type Request = ChangeStateRequest;
-    type Response = ChangeStateResponse;
-}
-
-/// `srv/GetState`.
-pub struct GetState;
+service!(GetState, "lifecycle_msgs", Empty => GetStateResponse);
 
 /// Response of [`GetState`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -73,15 +64,7 @@ pub struct GetStateResponse {
     pub current_state: State,
 }
 
-impl ServiceType for GetState {
-    const PACKAGE: &str = "lifecycle_msgs";
-    const NAME: &str = "GetState";
-    type Request = Empty;
-    type Response = GetStateResponse;
-}
-
-/// `srv/GetAvailableStates`.
-pub struct GetAvailableStates;
+service!(GetAvailableStates, "lifecycle_msgs", Empty => GetAvailableStatesResponse);
 
 /// Response of [`GetAvailableStates`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -89,26 +72,13 @@ pub struct GetAvailableStatesResponse {
     pub available_states: Vec<State>,
 }
 
-impl ServiceType for GetAvailableStates {
-    const PACKAGE: &str = "lifecycle_msgs";
-    const NAME: &str = "GetAvailableStates";
-    type Request = Empty;
-    type Response = GetAvailableStatesResponse;
-}
-
-/// `srv/GetAvailableTransitions`, served twice: as `~/get_available_transitions` (from the present state)
-/// and as `~/get_transition_graph` (all).
-pub struct GetAvailableTransitions;
+service!(
+    /// Served twice: as `~/get_available_transitions` (from the present state) and as `~/get_transition_graph` (all).
+    GetAvailableTransitions, "lifecycle_msgs", Empty => GetAvailableTransitionsResponse
+);
 
 /// Response of [`GetAvailableTransitions`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct GetAvailableTransitionsResponse {
     pub available_transitions: Vec<TransitionDescription>,
-}
-
-impl ServiceType for GetAvailableTransitions {
-    const PACKAGE: &str = "lifecycle_msgs";
-    const NAME: &str = "GetAvailableTransitions";
-    type Request = Empty;
-    type Response = GetAvailableTransitionsResponse;
 }

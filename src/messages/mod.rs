@@ -48,3 +48,20 @@ macro_rules! messages {
     )+};
 }
 use messages;
+
+/// A service of one package, by the structs of its request and response.
+macro_rules! service {
+    ($(#[$about:meta])* $name:ident, $package:literal, $request:ident => $response:ident) => {
+        #[doc = concat!("`", $package, "/srv/", stringify!($name), "`.")]
+        $(#[$about])*
+        pub struct $name;
+
+        impl $crate::messages::ServiceType for $name {
+            const PACKAGE: &'static str = $package;
+            const NAME: &'static str = stringify!($name);
+            type Request = $request;
+            type Response = $response;
+        }
+    };
+}
+use service;

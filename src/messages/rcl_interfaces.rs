@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::builtin_interfaces::Time;
-use super::{Message, ServiceType};
+use super::{Message, service};
 
 /// `msg/ParameterValue`: the field that `kind` names counts.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -116,8 +116,7 @@ pub struct Names {
     pub names: Vec<String>,
 }
 
-/// `srv/GetParameters`.
-pub struct GetParameters;
+service!(GetParameters, "rcl_interfaces", Names => GetParametersResponse);
 
 /// Response of [`GetParameters`], one value per name.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -125,15 +124,7 @@ pub struct GetParametersResponse {
     pub values: Vec<ParameterValue>,
 }
 
-impl ServiceType for GetParameters {
-    const PACKAGE: &str = "rcl_interfaces";
-    const NAME: &str = "GetParameters";
-    type Request = Names;
-    type Response = GetParametersResponse;
-}
-
-/// `srv/GetParameterTypes`.
-pub struct GetParameterTypes;
+service!(GetParameterTypes, "rcl_interfaces", Names => GetParameterTypesResponse);
 
 /// Response of [`GetParameterTypes`], one type per name.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -141,15 +132,7 @@ pub struct GetParameterTypesResponse {
     pub types: Vec<u8>,
 }
 
-impl ServiceType for GetParameterTypes {
-    const PACKAGE: &str = "rcl_interfaces";
-    const NAME: &str = "GetParameterTypes";
-    type Request = Names;
-    type Response = GetParameterTypesResponse;
-}
-
-/// `srv/DescribeParameters`.
-pub struct DescribeParameters;
+service!(DescribeParameters, "rcl_interfaces", Names => DescribeParametersResponse);
 
 /// Response of [`DescribeParameters`], one descriptor per name.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -157,15 +140,7 @@ pub struct DescribeParametersResponse {
     pub descriptors: Vec<ParameterDescriptor>,
 }
 
-impl ServiceType for DescribeParameters {
-    const PACKAGE: &str = "rcl_interfaces";
-    const NAME: &str = "DescribeParameters";
-    type Request = Names;
-    type Response = DescribeParametersResponse;
-}
-
-/// `srv/ListParameters`.
-pub struct ListParameters;
+service!(ListParameters, "rcl_interfaces", ListParametersRequest => ListParametersResponse);
 
 /// Request of [`ListParameters`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -183,21 +158,13 @@ pub struct ListParametersResponse {
     pub prefixes: Vec<String>,
 }
 
-impl ServiceType for ListParameters {
-    const PACKAGE: &str = "rcl_interfaces";
-    const NAME: &str = "ListParameters";
-    type Request = ListParametersRequest;
-    type Response = ListParametersResponse;
-}
-
 /// Request of [`SetParameters`] and [`SetParametersAtomically`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     pub parameters: Vec<Parameter>,
 }
 
-/// `srv/SetParameters`.
-pub struct SetParameters;
+service!(SetParameters, "rcl_interfaces", Settings => SetParametersResponse);
 
 /// Response of [`SetParameters`], one result per setting.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -205,27 +172,12 @@ pub struct SetParametersResponse {
     pub results: Vec<SetParametersResult>,
 }
 
-impl ServiceType for SetParameters {
-    const PACKAGE: &str = "rcl_interfaces";
-    const NAME: &str = "SetParameters";
-    type Request = Settings;
-    type Response = SetParametersResponse;
-}
-
-/// `srv/SetParametersAtomically`.
-pub struct SetParametersAtomically;
+service!(SetParametersAtomically, "rcl_interfaces", Settings => SetParametersAtomicallyResponse);
 
 /// Response of [`SetParametersAtomically`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SetParametersAtomicallyResponse {
     pub result: SetParametersResult,
-}
-
-impl ServiceType for SetParametersAtomically {
-    const PACKAGE: &str = "rcl_interfaces";
-    const NAME: &str = "SetParametersAtomically";
-    type Request = Settings;
-    type Response = SetParametersAtomicallyResponse;
 }
 
 /// `msg/LoggerLevel`.
@@ -236,8 +188,7 @@ pub struct LoggerLevel {
     pub level: u32,
 }
 
-/// `srv/GetLoggerLevels`.
-pub struct GetLoggerLevels;
+service!(GetLoggerLevels, "rcl_interfaces", Names => GetLoggerLevelsResponse);
 
 /// Response of [`GetLoggerLevels`], one level per name.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -245,15 +196,7 @@ pub struct GetLoggerLevelsResponse {
     pub levels: Vec<LoggerLevel>,
 }
 
-impl ServiceType for GetLoggerLevels {
-    const PACKAGE: &str = "rcl_interfaces";
-    const NAME: &str = "GetLoggerLevels";
-    type Request = Names;
-    type Response = GetLoggerLevelsResponse;
-}
-
-/// `srv/SetLoggerLevels`.
-pub struct SetLoggerLevels;
+service!(SetLoggerLevels, "rcl_interfaces", SetLoggerLevelsRequest => SetLoggerLevelsResponse);
 
 /// Request of [`SetLoggerLevels`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -266,11 +209,4 @@ pub struct SetLoggerLevelsRequest {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SetLoggerLevelsResponse {
     pub results: Vec<SetParametersResult>,
-}
-
-impl ServiceType for SetLoggerLevels {
-    const PACKAGE: &str = "rcl_interfaces";
-    const NAME: &str = "SetLoggerLevels";
-    type Request = SetLoggerLevelsRequest;
-    type Response = SetLoggerLevelsResponse;
 }

@@ -2,11 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ServiceType;
+use super::service;
 use super::std_msgs::Empty;
 
-/// `std_srvs/srv/Trigger`.
-pub struct Trigger;
+service!(Trigger, "std_srvs", Empty => Outcome);
 
 /// Whether what was asked for was done.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -16,25 +15,10 @@ pub struct Outcome {
     pub message: String,
 }
 
-impl ServiceType for Trigger {
-    const PACKAGE: &str = "std_srvs";
-    const NAME: &str = "Trigger";
-    type Request = Empty;
-    type Response = Outcome;
-}
-
-/// `std_srvs/srv/SetBool`.
-pub struct SetBool;
+service!(SetBool, "std_srvs", SetBoolRequest => Outcome);
 
 /// Request of [`SetBool`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SetBoolRequest {
     pub data: bool,
-}
-
-impl ServiceType for SetBool {
-    const PACKAGE: &str = "std_srvs";
-    const NAME: &str = "SetBool";
-    type Request = SetBoolRequest;
-    type Response = Outcome;
 }

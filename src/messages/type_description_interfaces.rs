@@ -8,9 +8,9 @@ use std::fmt::Write as _;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::ServiceType;
 use super::definitions::{contained, definition, trimmed};
 use super::diagnostic_msgs::KeyValue;
+use super::service;
 
 /// `msg/FieldType`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -61,8 +61,7 @@ pub struct TypeSource {
     pub raw_file_contents: String,
 }
 
-/// `srv/GetTypeDescription`.
-pub struct GetTypeDescription;
+service!(GetTypeDescription, "type_description_interfaces", GetTypeDescriptionRequest => GetTypeDescriptionResponse);
 
 /// Request of [`GetTypeDescription`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -82,13 +81,6 @@ pub struct GetTypeDescriptionResponse {
     pub type_description: TypeDescription,
     pub type_sources: Vec<TypeSource>,
     pub extra_information: Vec<KeyValue>,
-}
-
-impl ServiceType for GetTypeDescription {
-    const PACKAGE: &str = "type_description_interfaces";
-    const NAME: &str = "GetTypeDescription";
-    type Request = GetTypeDescriptionRequest;
-    type Response = GetTypeDescriptionResponse;
 }
 
 impl TypeDescription {

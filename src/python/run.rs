@@ -151,11 +151,7 @@ impl Observer for Watcher<'_> {
 
 /// Why a run ended, in words.
 pub(super) fn words(reason: &StopReason) -> String {
-    match reason {
-        StopReason::Diverged(divergence) => divergence.to_string(),
-        StopReason::Stuck(why) => why.clone(),
-        other => other.name().to_owned(),
-    }
+    reason.fault().unwrap_or_else(|| reason.name().to_owned())
 }
 
 /// A scene that was run to its end.

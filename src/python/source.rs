@@ -11,6 +11,7 @@ use super::run::interrupt_by;
 use crate::scene::bundled::{SCENES, SWARMS, bundled_swarm};
 use crate::scene::document::MAX_DEPTH;
 use crate::scene::swarm::Swarm;
+use crate::scene::text::{is_path, nearest};
 use crate::scene::{Bundled, Place, Problem, Scene, SceneError, bundled};
 use crate::study::trade::{Chosen, choose};
 
@@ -63,7 +64,7 @@ impl Source {
         };
         let origin = match path.to_str().and_then(find) {
             Some(bundled) => Origin::Bundled(bundled),
-            None if is_path(&path) => Origin::File(path),
+            None if is_path(&path.to_string_lossy()) => Origin::File(path),
             None => return Err(not_bundled(kind, all, &path.to_string_lossy())),
         };
         Ok(Self { origin, set })
@@ -102,14 +103,10 @@ impl Source {
     }
 }
 
-/// Whether a word is a path rather than a name: one that is there, or looks like one.
-fn is_path(path: &Path) -> bool {
-    path.exists() || path.to_string_lossy().contains(['/', '\\', '.'])
-}
-
 fn not_bundled(kind: &str, all: &[Bundled], word: &str) -> PyErr {
-    let likeness = |one: &&Bundled| strsim::jaro_winkler(one.name, word);
-    let nearest = all.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b))).map_or("", |one| one.name);
+    let names: Vec<&str> = all.iter().map(|one| one.name).collect();
+    let nearest = nearest(word, &names);
+    let nearest = nearest.map_or_else(String::new, |name| format!("; the nearest name is `{name}`"));
     let list = kind.to_uppercase() + "S";
     let (message, help) = match kind {
         "swarm" if bundled(word).is_some() => {
@@ -119,7 +116,7 @@ fn not_bundled(kind: &str, all: &[Bundled], word: &str) -> PyErr {
             ("is a bundled swarm, no scene".to_owned(), "flockform.Swarm takes it".to_owned())
         }
         _ => (
-            format!("there is no bundled {kind} and no file of this name; the nearest name is `{nearest}`"),
+            format!("there is no bundled {kind} and no file of this name{nearest}"),
             format!("flockform.{list} lists the names; a path ends in .toml"),
         ),
     };

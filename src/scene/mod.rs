@@ -11,7 +11,7 @@ pub mod points;
 pub mod raw;
 pub mod swarm;
 pub mod table;
-pub(crate) mod text;
+pub mod text;
 pub mod units;
 pub mod validate;
 

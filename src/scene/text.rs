@@ -1,4 +1,4 @@
-//! The text of a file that a scene, a swarm or a command line names.
+//! What people write: files that a scene, a swarm or a command line names, and words with slips in them.
 
 use std::fs::File;
 use std::io::{Error, ErrorKind, Read, Result};
@@ -6,6 +6,9 @@ use std::path::Path;
 
 /// Beyond any table of points that could be a body, and far below the memory of a computer.
 const MOST_BYTES: u64 = 1 << 30;
+
+/// No word is suggested for one longer than this.
+const LONGEST_MISSPELLING: usize = 64;
 
 /// The text of a file of at most one GiB, so that a device without end, or another program's data, is refused and
 /// does not fill the memory.
@@ -23,6 +26,32 @@ fn read_at_most(path: &Path, most: u64) -> Result<String> {
         return Err(Error::new(ErrorKind::FileTooLarge, format!("longer than {} MiB", most >> 20)));
     }
     Ok(text)
+}
+
+/// Whether a word is a path rather than a name: one that is there, or looks like one.
+pub fn is_path(word: &str) -> bool {
+    Path::new(word).exists() || word.contains(['/', '\\', '.'])
+}
+
+/// The candidate that `word` most probably misspells or abbreviates, if any is near enough: a mere guess would mislead
+/// more than none.
+pub fn nearest<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
+    if word.len() > LONGEST_MISSPELLING {
+        return None;
+    }
+    let folded = |text: &str| text.to_lowercase().replace('-', "_");
+    let word = folded(word);
+    let distance = |candidate: &&'a str| {
+        let candidate = folded(candidate);
+        let distance = strsim::osa_distance(&word, &candidate);
+        let length = word.chars().count().max(candidate.chars().count());
+        let shorter = word.chars().count().min(candidate.chars().count());
+        let abbreviates = shorter >= 3 && (word.starts_with(&candidate) || candidate.starts_with(&word));
+        // Beyond a third of the letters, a suggestion is a guess.
+        (distance < length && (distance <= (length / 3).max(1) || abbreviates)).then_some(distance)
+    };
+    let scored = candidates.iter().filter_map(|candidate| Some((distance(candidate)?, *candidate)));
+    scored.min_by_key(|(distance, _)| *distance).map(|(_, candidate)| candidate)
 }
 
 #[cfg(test)]

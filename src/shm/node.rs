@@ -11,13 +11,12 @@ use super::payload::{Command, Formation, Member};
 use super::{Capacity, Domain, Peer, Reader, ShmError, Writer, wait};
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::RawCommands;
+use crate::swarm::control::Control;
 use crate::swarm::control::scope::NodeScope;
 use crate::swarm::control::state::{FormationState, MemberState};
-use crate::swarm::control::{Control, Mode};
 use crate::swarm::pace::{Due, Pace, system_time};
 use crate::swarm::transport::complaints::Complaints;
 use crate::swarm::transport::{listen, serve};
-use crate::swarm::watch::Health;
 
 /// Leaf of the service that carries commands to the node.
 pub const COMMANDS: &str = "commands";
@@ -159,11 +158,7 @@ impl FormationNode {
         let state = FormationState::of(&self.control);
         let nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
         let formation = Formation {
-            mode: match state.mode {
-                Mode::Running => Formation::RUNNING,
-                Mode::EmergencyStopped => Formation::EMERGENCY_STOPPED,
-                Mode::Inactive => Formation::INACTIVE,
-            },
+            mode: state.mode.number().into(),
             members: state.members.len() as u32,
             formation_error: nan(state.formation_error),
             clearance: state.clearance,
@@ -184,13 +179,7 @@ fn wire(number: usize, name: &str, member: &MemberState) -> Member {
     Member {
         member: number as u32,
         role: u32::from(!member.leads),
-        health: match member.health {
-            Health::Waiting => 0,
-            Health::Fresh => 1,
-            Health::Held => 2,
-            Health::Degraded => 3,
-            Health::Stopped => 4,
-        },
+        health: member.health.number().into(),
         flags: member.flags,
         position: point(member.position),
         target: point(member.target),

@@ -5,6 +5,8 @@
 
 use iceoryx2::prelude::ZeroCopySend;
 
+use crate::swarm::control::Mode;
+
 /// An element of a slice, known to peers by name.
 pub trait Payload: ZeroCopySend + Copy + std::fmt::Debug + 'static {
     /// As peers name it.
@@ -178,11 +180,11 @@ impl Command {
 
 impl Formation {
     /// Members get targets by the rule.
-    pub const RUNNING: u32 = 0;
+    pub const RUNNING: u32 = Mode::Running.number() as u32;
     /// Every member holds its place.
-    pub const EMERGENCY_STOPPED: u32 = 2;
+    pub const EMERGENCY_STOPPED: u32 = Mode::EmergencyStopped.number() as u32;
     /// No member gets a target.
-    pub const INACTIVE: u32 = 3;
+    pub const INACTIVE: u32 = Mode::Inactive.number() as u32;
 }
 
 impl Member {

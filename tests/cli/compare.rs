@@ -16,7 +16,8 @@ fn a_table_is_printed_and_the_results_stand_in_a_numbered_folder() {
     let folder = temporary();
     for name in ["beam-compare", "beam-compare-2"] {
         let said = compare(folder.path(), &[]);
-        for words in ["at rest; truth of the shape on ", "von Mises, relative L2", "time, truth", name] {
+        for words in ["in equilibrium; truth of the shape on ", "von Mises, relative L2", "time, truth", name]
+        {
             assert!(said.contains(words), "{words}: {said}");
         }
         assert!(folder.path().join("out").join(name).join("compare.json").is_file());

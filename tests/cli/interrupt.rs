@@ -171,7 +171,7 @@ fn increments_that_are_solved_before_an_interrupt_are_kept() {
 fn a_flight_keeps_what_was_flown_and_says_so() {
     let job = ["swarm", "square", "--set", "flight.duration=100000"];
     for (film, missing) in
-        [(&[][..], "there are no figures"), (&["--film", "f.gif"], "neither figures nor a film")]
+        [(&[][..], "figures are missing"), (&["--film", "f.gif"], "figures and the film are missing")]
     {
         let (_, said) = kept(&[&job, film].concat(), Duration::from_millis(300), "flight.json");
         assert!(said.contains(missing), "{said}");

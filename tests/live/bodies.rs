@@ -236,8 +236,7 @@ fn a_side_that_is_loaded_by_hand_goes_there_and_is_replayed_to_the_bit() {
 fn tools_are_those_that_the_body_takes() {
     let cut = Command::Cut { from: [0.5, -100.0], to: [0.6, 100.0] };
     for (name, tools) in [("tension", &["cut"][..]), ("beam-loaded", &["load"]), ("drop", &[])] {
-        let session = Session::Body(Box::new(begun(name, &[])));
-        assert_eq!(session.tools(), tools, "{name}");
+        assert_eq!(begun(name, &[]).tools(), tools, "{name}");
         assert_eq!(begun(name, &[]).perform(0, &cut).is_ok(), tools.contains(&"cut"), "{name}");
     }
 }

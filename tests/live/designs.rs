@@ -1,6 +1,7 @@
 //! A formation designed by hand, and the file that it becomes.
 
 use flockform::live::command::Command;
+use flockform::live::session::Session;
 use flockform::live::swarm::Swarm as Live;
 use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
@@ -71,7 +72,7 @@ fn robots_given_one_by_one_fly_as_the_lattice_does_that_they_come_from() {
 #[test]
 fn what_a_designer_does_is_in_the_file_and_is_undone() {
     let mut live = begun("square", &["rule={}", "limits.clearance=0.1"]);
-    (0..30).for_each(|_| live.advance());
+    (0..30).for_each(|_| live.advance().expect("flies"));
     edit(&mut live, Edit::Place { at: [8.0, 3.0], leads: false });
     assert_eq!((formation(&live).count(), live.flight().fleet().period()), (26, 0), "it begins anew");
     // The column at x = 6 is the nearest.
@@ -183,6 +184,6 @@ proptest! {
         let again = Formation::lay_out(&file).unwrap_or_else(|error| panic!("{error}"));
         prop_assert_eq!(&again.names, &formation(&live).names);
         prop_assert_eq!(&again.places, &formation(&live).places);
-        live.advance();
+        live.advance().expect("flies");
     }
 }

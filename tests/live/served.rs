@@ -22,17 +22,17 @@ impl Served {
     pub fn scene(name: &str, set: &[String], folder: &Path) -> Self {
         let scene = bundled(name).expect("bundled").load(set).unwrap_or_else(|error| panic!("{error}"));
         let body = Body::new(scene, None).unwrap_or_else(|error| panic!("{error}"));
-        Self::session(Session::Body(Box::new(body)), folder)
+        Self::session(Box::new(body), folder)
     }
 
     pub fn swarm(name: &str, set: &[String], folder: &Path) -> Self {
         let swarm = bundled_swarm(name).expect("bundled").load_swarm(set);
         let swarm = swarm.unwrap_or_else(|error| panic!("{error}"));
         let swarm = Swarm::new(swarm, None).unwrap_or_else(|error| panic!("{error}"));
-        Self::session(Session::Swarm(Box::new(swarm)), folder)
+        Self::session(Box::new(swarm), folder)
     }
 
-    fn session(session: Session, folder: &Path) -> Self {
+    fn session(session: Box<dyn Session>, folder: &Path) -> Self {
         let server = Server::open(None).expect("a free port");
         let (address, folder) = (server.address(), folder.to_owned());
         let command = format!("flockform live {}", session.title().0);

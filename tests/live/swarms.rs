@@ -1,6 +1,7 @@
 //! A swarm led by hand and hurt, and the file that flies it again.
 
 use flockform::live::command::Command;
+use flockform::live::session::Session;
 use flockform::live::swarm::Swarm as Live;
 use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
@@ -22,7 +23,7 @@ fn ask(swarm: &mut Live, text: &str) {
 }
 
 fn fly(swarm: &mut Live, periods: usize) {
-    (0..periods).for_each(|_| swarm.advance());
+    (0..periods).for_each(|_| swarm.advance().expect("flies"));
 }
 
 fn leader(swarm: &Live) -> usize {

@@ -1,8 +1,9 @@
 //! What goes wrong with robots in flight, row by row: what the rest of the formation does.
 
 use flockform::flock::vectors::distance;
-use flockform::swarm::control::{Control, NEIGHBOUR_LOST, TRIMMED};
+use flockform::swarm::control::Control;
 use flockform::swarm::flight::Flight;
+use flockform::swarm::safety::Flags;
 use flockform::swarm::watch::{Health, Pose};
 
 use super::support::*;
@@ -54,7 +55,8 @@ fn a_silent_member_is_held_then_dropped_then_stopped_and_the_others_come_home() 
     assert!((10..=12).contains(&until_health(&mut flight, Health::Degraded)));
     assert!(flight.control().target(MIDDLE).is_none(), "nobody is sent anywhere from nothing");
     fly(&mut flight, 1);
-    let lost: Vec<usize> = (0..25).filter(|&m| flight.control().flags(m) & NEIGHBOUR_LOST != 0).collect();
+    let lost: Vec<usize> =
+        (0..25).filter(|&m| flight.control().flags(m) & Flags::NEIGHBOUR_LOST != 0).collect();
     assert_eq!(lost, [6, 7, 8, 11, 13, 16, 17, 18], "its neighbours say so, and nobody else");
     fly(&mut flight, 800);
     assert_eq!(flight.control().health(MIDDLE), Health::Stopped);
@@ -147,7 +149,7 @@ fn one_liar_is_trimmed_on_eight_neighbours_and_leads_them_astray_without() {
         let mut flight =
             Flight::new(&load_swarm("square", &overrides)).unwrap_or_else(|error| panic!("{error}"));
         fly(&mut flight, 600);
-        let trimmed = (0..25).any(|m| flight.control().flags(m) & TRIMMED != 0);
+        let trimmed = (0..25).any(|m| flight.control().flags(m) & Flags::TRIMMED != 0);
         let formation = flight.control().formation();
         let places = flight.fleet().places();
         let apart = |m: usize| {

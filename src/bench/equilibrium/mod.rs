@@ -13,6 +13,7 @@ use serde::Serialize;
 
 use self::beam::{Parts, Plate};
 use super::machine::median;
+use super::quick_note;
 use crate::flock::vectors::Vectors;
 use crate::solve::equilibrium::{Choice, Request, SolveError, Solved, Solver, System, solve};
 use crate::solve::operator::OperatorError;
@@ -31,13 +32,6 @@ const BODY_BYTES: f64 = 16.0 + 8.0 + 36.0 + 4.0;
 
 /// A body with one coarser level, too small to leave room for that of another.
 const WARM_UP: Plate = Plate { cells: [28, 28], holes: false };
-
-/// Options of the measurement.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Options {
-    /// Small bodies and few repetitions, to see that it runs; the times mean little.
-    pub quick: bool,
-}
 
 /// Why nothing could be measured.
 #[derive(Debug, thiserror::Error)]
@@ -113,19 +107,15 @@ fn bodies(quick: bool) -> (Vec<Plate>, usize) {
 ///
 /// # Errors
 /// If a system cannot be solved, which would be a bug.
-pub fn run(options: &Options) -> Result<Report, EquilibriumError> {
-    let (plates, repetitions) = bodies(options.quick);
+pub fn run(quick: bool) -> Result<Report, EquilibriumError> {
+    let (plates, repetitions) = bodies(quick);
     // Memory first, and small bodies before large ones: what was freed before would hide what is used. The pages of
     // the program itself and the threads' stacks are no part of the first body: a tiny one touches them.
     bytes_per_particle(&WARM_UP.parts())?;
     let bytes: Vec<Option<f64>> =
         plates.iter().map(|plate| bytes_per_particle(&plate.parts())).collect::<Result<_, _>>()?;
     let cases = plates.iter().zip(bytes).map(|(plate, bytes)| Case::measure(plate, bytes, repetitions));
-    Ok(Report {
-        quick: options.quick,
-        threads: rayon::current_num_threads(),
-        cases: cases.collect::<Result<_, _>>()?,
-    })
+    Ok(Report { quick, threads: rayon::current_num_threads(), cases: cases.collect::<Result<_, _>>()? })
 }
 
 fn request(solver: Solver, tolerance: f64, most_iterations: usize) -> Request {
@@ -279,10 +269,7 @@ impl fmt::Display for Report {
         writeln!(f, "\nIterations to a residual of {RESIDUAL:e}: {}.", iterations.join(", "))?;
         let threads = if self.threads == 1 { "thread" } else { "threads" };
         writeln!(f, "Multigrid on {} {threads}, the factorisation on one.", self.threads)?;
-        if self.quick {
-            writeln!(f, "A quick run: it shows that the benchmark works, its times mean little.")?;
-        }
-        Ok(())
+        quick_note(self.quick, f)
     }
 }
 
@@ -296,7 +283,7 @@ mod tests {
 
     #[test]
     fn a_quick_run_reaches_both_errors_on_every_body() {
-        let report = run(&Options { quick: true }).expect("solvable");
+        let report = run(true).expect("solvable");
         for case in &report.cases {
             assert!(case.iterations < MOST_ITERATIONS && case.direct_residual < RESIDUAL, "{case:?}");
             let reached: Vec<usize> = case.to_error.iter().map(|to| to.iterations).collect();

@@ -12,17 +12,11 @@ use std::fmt;
 
 use serde::Serialize;
 
+use super::quick_note;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 
-/// Options of the measurement.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Options {
-    /// The smallest swarms and few repetitions, to see that it runs; the times mean little.
-    pub quick: bool,
-}
-
-/// The amount of work that [`Options`] stand for.
+/// The amount of work of a measurement.
 struct Effort {
     robots: &'static [usize],
     /// Robots, and how often the rule is applied in a tick.
@@ -64,10 +58,10 @@ pub struct Report {
 }
 
 /// Measures; takes about twenty seconds, or a few if quick.
-pub fn run(options: &Options) -> Report {
-    let effort = if options.quick { &QUICK } else { &FULL };
+pub fn run(quick: bool) -> Report {
+    let effort = if quick { &QUICK } else { &FULL };
     Report {
-        quick: options.quick,
+        quick,
         cases: effort.robots.iter().map(|&robots| rule::measure(robots, effort)).collect(),
         ticks: effort.ticks.iter().map(|&(robots, sweeps)| tick::measure(robots, sweeps, effort)).collect(),
         latency: latency::measure(effort.latency),
@@ -161,10 +155,7 @@ impl fmt::Display for Report {
             writeln!(f, "{robots:>7} robots  {sweeps:>4} sweeps a tick  {ms:>9.4} ms {rate:>8.0} / ms")?;
         }
         writeln!(f, "\nPose in to target out over loopback:\n{}", self.latency)?;
-        if self.quick {
-            writeln!(f, "A quick run: it shows that the benchmark works, its times mean little.")?;
-        }
-        Ok(())
+        quick_note(self.quick, f)
     }
 }
 
@@ -174,7 +165,7 @@ mod tests {
 
     #[test]
     fn a_quick_run_serves_two_swarms_with_and_without_the_filter() {
-        let report = run(&Options { quick: true });
+        let report = run(true);
         let json = serde_json::to_value(&report).expect("plain numbers");
         let robots: Vec<_> = report.cases.iter().map(|case| case.robots).collect();
         assert_eq!(robots, [12, 100]);

@@ -21,14 +21,7 @@ pub use capabilities::{Capability, measure as measure_capabilities};
 
 const THREADS: [usize; 2] = [1, 2];
 
-/// Options of the measurement.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Options {
-    /// Small bodies and few repetitions, to see that it runs; the times mean little.
-    pub quick: bool,
-}
-
-/// The amount of work that [`Options`] stand for.
+/// The amount of work of a measurement.
 struct Effort {
     /// Particles along each side of the square bodies.
     sides: &'static [usize],
@@ -105,10 +98,10 @@ pub struct Case {
 ///
 /// # Errors
 /// If the system refuses to start the threads.
-pub fn run(options: &Options) -> Result<Report, ThreadPoolBuildError> {
-    let effort = if options.quick { &QUICK } else { &FULL };
+pub fn run(quick: bool) -> Result<Report, ThreadPoolBuildError> {
+    let effort = if quick { &QUICK } else { &FULL };
     let mut report = Report {
-        quick: options.quick,
+        quick,
         processor: processor(),
         chosen: chosen_here(),
         triad: Vec::new(),
@@ -191,7 +184,7 @@ mod tests {
 
     #[test]
     fn a_quick_run_measures_every_subject_and_capability() {
-        let report = run(&Options { quick: true }).expect("threads");
+        let report = run(true).expect("threads");
         let json = serde_json::to_value(&report).expect("plain numbers");
         for case in json["cases"].as_array().expect("cases") {
             for key in ["seconds_per_step", "updates_per_second", "share_of_roofline", "bytes_per_update"] {

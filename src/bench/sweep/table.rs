@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::super::machine::Bandwidth;
+use super::super::quick_note;
 use super::Report;
 
 const GIGA: f64 = 1e-9;
@@ -56,9 +57,9 @@ impl fmt::Display for Report {
             )?;
         }
         if self.quick {
-            writeln!(f, "\nA quick run: it shows that the benchmark works, its times mean little.")?;
+            writeln!(f)?;
         }
-        Ok(())
+        quick_note(self.quick, f)
     }
 }
 

@@ -24,17 +24,11 @@ use std::fmt;
 
 use serde::Serialize;
 
+use super::quick_note;
 use crate::shm::payload::Pose;
 use measure::{Case, Samples, Work, exchange};
 
-/// Options of the measurement.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Options {
-    /// Small messages and few of them, to see that it runs; the times mean little.
-    pub quick: bool,
-}
-
-/// The amount of work that [`Options`] stand for.
+/// The amount of work of a measurement.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
     /// Poses in a message.
@@ -95,10 +89,10 @@ fn pose(k: usize) -> Pose {
 }
 
 /// Measures; takes about two minutes, or a few seconds if quick.
-pub fn run(options: &Options) -> Report {
-    let effort = if options.quick { &QUICK } else { &FULL };
+pub fn run(quick: bool) -> Report {
+    let effort = if quick { &QUICK } else { &FULL };
     let mut report = Report {
-        quick: options.quick,
+        quick,
         bytes_per_pose: size_of::<Pose>(),
         cases: Vec::new(),
         ours_over_raw: Vec::new(),
@@ -177,10 +171,7 @@ impl fmt::Display for Report {
         }
         writeln!(f, "CPU is that of both threads for one message, of which a round trip has two.")?;
         self.skipped.iter().try_for_each(|why| writeln!(f, "not measured: {why}"))?;
-        if self.quick {
-            writeln!(f, "A quick run: it shows that the benchmark works, its times mean little.")?;
-        }
-        Ok(())
+        quick_note(self.quick, f)
     }
 }
 
@@ -190,7 +181,7 @@ mod tests {
 
     #[test]
     fn a_quick_run_measures_every_way_and_its_json_says_so() {
-        let report = run(&Options { quick: true });
+        let report = run(true);
         let json = serde_json::to_value(&report).expect("plain numbers");
         let ways = if cfg!(feature = "ros") { 5 } else { 4 };
         let cases = json["cases"].as_array().expect("cases");

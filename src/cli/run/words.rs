@@ -10,21 +10,15 @@ use flockform::scene::Scene;
 
 pub fn closing_words(scene: &Scene, outcome: &Outcome, summary: &Summary, elapsed: Duration) -> String {
     let engine = &outcome.engine;
-    let how = match &outcome.reason {
-        StopReason::Equilibrium => "in equilibrium".to_owned(),
-        StopReason::Unsettled => "the solver ended short of its tolerance".to_owned(),
-        StopReason::Stuck(why) => format!("not {why}"),
-        StopReason::Steps => "all steps done".to_owned(),
-        StopReason::Interrupted if outcome.solved.is_some() => {
-            "interrupted: what there was is written".to_owned()
-        }
-        StopReason::Interrupted => {
-            "interrupted: what there was is written, `flockform run --resume` goes on".to_owned()
-        }
-        StopReason::Diverged(divergence) => format!("{divergence}; the last good state is written"),
+    let how = &outcome.reason;
+    let kept = match how {
+        StopReason::Interrupted if outcome.solved.is_some() => ": what there was is written",
+        StopReason::Interrupted => ": what there was is written, `flockform run --resume` goes on",
+        StopReason::Diverged(_) => "; the last good state is written",
+        _ => "",
     };
     let mut words = format!(
-        "{}: {} {}, residual {:.2e}, {how} ({:.2} s)\n",
+        "{}: {} {}, residual {:.2e}, {how}{kept} ({:.2} s)\n",
         scene.name,
         scene.counts(),
         engine.step(),

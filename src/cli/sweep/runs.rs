@@ -20,7 +20,7 @@ use flockform::study::design::Design;
 use flockform::study::trade::{Chosen, choose};
 
 use super::super::names::SceneArguments;
-use super::super::progress::Stages;
+use super::super::progress::Progress;
 use super::super::{Refusal, interrupt};
 
 /// How a run ended that could not begin.
@@ -56,7 +56,7 @@ struct Ended {
 impl Ended {
     /// Whether it has all that such a run has: what diverged may lack some of it.
     fn is_sound(&self) -> bool {
-        !matches!(self.stop_reason, StopReason::Diverged(_) | StopReason::Stuck(_))
+        self.stop_reason.fault().is_none()
     }
 
     /// The first output that such a run does not have.
@@ -115,7 +115,7 @@ impl Runs<'_> {
             next: AtomicUsize::new(0),
             made: Mutex::default(),
             failure: Mutex::default(),
-            stages: Mutex::new(Stages::new(quiet)),
+            progress: Progress::of_stages(quiet),
         };
         let spawned = std::thread::scope(|scope| {
             let work = &work;
@@ -126,8 +126,8 @@ impl Runs<'_> {
             // Without all of its threads it ends with the runs that are under way.
             spawned.inspect_err(|_| work.next.store(pending.len(), Ordering::Relaxed))
         });
-        let Work { made, failure, stages, .. } = work;
-        stages.into_inner().unwrap_or_else(PoisonError::into_inner).finish();
+        let Work { made, failure, progress, .. } = work;
+        progress.finish();
         spawned.map_err(|error| Refusal::threads(threads, error))?;
         match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
             Some(error) => Err(error.into()),
@@ -164,13 +164,8 @@ impl Runs<'_> {
         match ended {
             Ok(Ended { stop_reason: StopReason::Interrupted, .. }) => None,
             Ok(Ended { stop_reason, outputs }) => {
-                let reason = match &stop_reason {
-                    StopReason::Diverged(divergence) => divergence.to_string(),
-                    StopReason::Stuck(why) => why.clone(),
-                    _ => String::new(),
-                };
                 let outputs = outputs.into_iter().map(Result::unwrap_or_default).collect();
-                row(stop_reason.name(), outputs, reason)
+                row(stop_reason.name(), outputs, stop_reason.fault().unwrap_or_default())
             }
             // A solve that was broken off has an error as well.
             Err(_) if interrupt::is_raised() => None,
@@ -194,7 +189,7 @@ struct Work<'a> {
     next: AtomicUsize,
     made: Mutex<Vec<Row>>,
     failure: Mutex<Option<ExportError>>,
-    stages: Mutex<Stages>,
+    progress: Progress,
 }
 
 impl Work<'_> {
@@ -207,7 +202,7 @@ impl Work<'_> {
         };
         let words = self.runs.design.overrides(run).join(", ");
         let stage = format!("run {} of {}: {words}", self.done + place + 1, self.done + self.pending.len());
-        self.stages.lock().unwrap_or_else(PoisonError::into_inner).next(&stage);
+        self.progress.stage(&stage);
         let Some(row) = self.runs.row(run, self.runs.ended(run)) else { return ControlFlow::Break(()) };
         if let Err(error) = self.journal.add(&row) {
             *self.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);

@@ -275,9 +275,7 @@ fn draw_field_raster(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, field: &Fi
     for (i, place) in snapshot.positions.iter().enumerate().filter(|(i, _)| snapshot.roles[*i].is_body()) {
         raster.drop(axes.place(place), field.values[i]);
     }
-    for (band, path) in raster.paths(field.bands.count(), |value| field.bands.of(value)).iter().enumerate() {
-        svg.path(path, format_args!("fill=\"{}\" shape-rendering=\"crispEdges\"", field.bands.colour(band)));
-    }
+    raster.draw_bands(svg, field.bands);
 }
 
 /// Dots leave gaps through which bonds are seen \[px\].
@@ -308,9 +306,6 @@ fn draw_raster(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, spacing: f64) {
     for &end in snapshot.broken.iter().flatten() {
         drop(snapshot.positions.get(end as usize), None);
     }
-    let paths = raster.paths(SQUARE_ORDER.len(), |rank| rank as usize);
-    for (path, shown) in paths.iter().zip(SQUARE_ORDER) {
-        let colour = shown.map_or(colour::BROKEN_BOND_SQUARE, colour::of_role);
-        svg.path(path, format_args!("fill=\"{colour}\" shape-rendering=\"crispEdges\""));
-    }
+    let colour = |n: usize| SQUARE_ORDER[n].map_or(colour::BROKEN_BOND_SQUARE, colour::of_role).to_owned();
+    raster.draw(svg, SQUARE_ORDER.len(), |rank| rank as usize, colour);
 }

@@ -119,7 +119,5 @@ fn draw_raster(
     for &i in drawn {
         raster.drop(axes.place(snapshot.positions.get(i)), snapshot.pe1[i]);
     }
-    for (band, path) in raster.paths(bands.count(), |value| bands.of(value)).iter().enumerate() {
-        svg.path(path, format_args!("fill=\"{}\" shape-rendering=\"crispEdges\"", bands.colour(band)));
-    }
+    raster.draw_bands(svg, bands);
 }

@@ -25,6 +25,7 @@ pub(super) mod png;
 mod raster;
 mod stress;
 mod svg;
+pub(crate) use svg::escaped;
 pub(crate) mod sweep;
 mod ticks;
 mod von_mises;
@@ -95,6 +96,7 @@ pub(super) fn render(svg: &str, width: f32) -> Result<Vec<u8>, String> {
 
 /// The files of a figure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Formats {
     /// No figures at all.
     None,

@@ -2,7 +2,8 @@
 
 use super::PNG_ZOOM;
 use super::axes::Axes;
-use super::svg::Path;
+use super::bands::Bands;
+use super::svg::{Path, Svg};
 
 /// Squares over a plot; those that nothing fell into stay empty.
 #[derive(Clone, Debug)]
@@ -61,6 +62,24 @@ impl Raster {
             }
         }
         paths
+    }
+
+    /// Draws the squares of each class in its colour.
+    pub fn draw(
+        &self,
+        svg: &mut Svg,
+        classes: usize,
+        class: impl Fn(f64) -> usize,
+        colour: impl Fn(usize) -> String,
+    ) {
+        for (n, path) in self.paths(classes, class).iter().enumerate() {
+            svg.path(path, format_args!("fill=\"{}\" shape-rendering=\"crispEdges\"", colour(n)));
+        }
+    }
+
+    /// Draws the squares in the colours of bands.
+    pub fn draw_bands(&self, svg: &mut Svg, bands: &Bands) {
+        self.draw(svg, bands.count(), |value| bands.of(value), |band| bands.colour(band));
     }
 }
 

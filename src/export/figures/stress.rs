@@ -16,7 +16,7 @@ use crate::material::cells::Cells;
 use crate::material::stress::StressState;
 
 /// More cells than this are drawn as a raster.
-const MOST_CELLS: usize = 60_000;
+const MOST_SHOWN: usize = 60_000;
 /// Stress below this part of the largest is rounding.
 const NOISE: f64 = 1e-9;
 
@@ -38,7 +38,7 @@ pub fn stress(
             value.is_finite() && cell.iter().all(|&i| places.get(i as usize).iter().all(|v| v.is_finite()))
         })
         .collect();
-    let corners = at_corners(cells, stresses).filter(|_| shown.len() <= MOST_CELLS);
+    let corners = at_corners(cells, stresses).filter(|_| shown.len() <= MOST_SHOWN);
     let values = shown.iter().map(|(_, value)| *value).chain(corners.iter().flatten().copied().flatten());
     let range = values.fold([f64::INFINITY, 0.0], |[low, high], v| [f64::min(low, v), f64::max(v, high)]);
     let bands = Bands::fine(range[0].min(range[1]), range[1], NOISE * range[1]);
@@ -46,7 +46,7 @@ pub fn stress(
     let place = if corners.is_some() { "" } else { " in the cells" };
     let mut note =
         format!("von Mises stress{place}, {}{}", page::note(subject, snapshot), scale_note(factor));
-    let is_raster = shown.len() > MOST_CELLS;
+    let is_raster = shown.len() > MOST_SHOWN;
     if is_raster {
         note += &format!("; {} cells drawn as squares of their largest value", shown.len());
     }
@@ -68,12 +68,10 @@ pub fn stress(
 /// \[count\].
 fn at_corners(cells: &Cells, stresses: &Stresses) -> Option<Vec<Option<f64>>> {
     let is_known = !stresses.recovered.is_empty() && cells.inclusions.is_empty();
-    let of = |stress: &Option<_>| stress.as_ref().map(von_mises).filter(|value| value.is_finite());
+    let of = |stress: &Option<StressState>| {
+        stress.map(|stress| stress.von_mises).filter(|value| value.is_finite())
+    };
     is_known.then(|| stresses.particles.iter().map(of).collect())
-}
-
-fn von_mises(stress: &StressState) -> f64 {
-    stress.von_mises
 }
 
 /// The cells with the stress at their corners.
@@ -132,7 +130,5 @@ fn draw_raster(
         let corners: Vectors = cell.iter().map(|&i| places.get(i as usize)).collect();
         raster.drop(axes.place(corners.middle()), *value);
     }
-    for (band, path) in raster.paths(bands.count(), |value| bands.of(value)).iter().enumerate() {
-        svg.path(path, format_args!("fill=\"{}\" shape-rendering=\"crispEdges\"", bands.colour(band)));
-    }
+    raster.draw_bands(svg, bands);
 }

@@ -105,7 +105,8 @@ impl Svg {
         self.push(format_args!(
             "<text x=\"{x:.2}\" y=\"{y:.2}\" dy=\"{rise:.2}\" text-anchor=\"{anchor}\" font-size=\"{size}\" \
              fill=\"{colour}\"{turn}>{}</text>",
-            escaped(content)
+            // XML 1.0 has no place for control characters, not even as references.
+            escaped(&content.replace(char::is_control, " "))
         ));
     }
 
@@ -156,19 +157,9 @@ pub fn text_width(content: &str, size: f64) -> f64 {
     content.chars().map(|c| f64::from(advance(c))).sum::<f64>() * size / 100.0
 }
 
-fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            // XML 1.0 has no place for control characters, not even as references.
-            c if c.is_control() => out.push(' '),
-            c => out.push(c),
-        }
-    }
-    out
+/// A text within markup or a quoted attribute.
+pub fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ use crate::export::report::RunRecorder;
 use crate::flock::pseudo_energy::pe1_among;
 use crate::flock::strain::strain_among;
 use crate::flock::vectors::Vectors;
+use crate::material::stress::StressState;
 use crate::scene::Scene;
 use crate::scene::units::Units;
 
@@ -160,7 +161,7 @@ impl Shown<'_> {
             .and_then(|elastic| Stresses::of(self.engine, elastic, &displacement, &self.broken(frame)));
         let none = || vec![f64::NAN; displacement.len()];
         let size = |found: Stresses| {
-            let of = |one: &Option<_>| one.as_ref().map_or(f64::NAN, von_mises);
+            let of = |one: &Option<StressState>| one.map_or(f64::NAN, |stress| stress.von_mises);
             found.particles.iter().map(of).collect()
         };
         found.map_or_else(none, size)
@@ -178,8 +179,4 @@ impl Shown<'_> {
         };
         Some(Scale { quantity, unit, bands: setting.bands(noise) })
     }
-}
-
-fn von_mises(stress: &crate::material::stress::StressState) -> f64 {
-    stress.von_mises
 }

@@ -56,8 +56,6 @@ impl Exhibit {
 
 #[derive(Serialize)]
 struct List<'a> {
-    program: &'static str,
-    version: &'static str,
     exhibits: &'a [Exhibit],
 }
 
@@ -75,15 +73,11 @@ pub fn write_gallery(folder: &OutputFolder, exhibits: &[Exhibit]) -> Result<Vec<
             sections += &format!("<h2>{heading}</h2>\n<ul class=\"gallery\">\n{cards}</ul>\n");
         }
     }
-    let program = format!("{} {}", summary::PROGRAM, env!("CARGO_PKG_VERSION"));
+    let program = format!("{} {}", summary::PROGRAM, summary::VERSION);
     let page = filled(PAGE, &[("program", program), ("style", STYLE.into()), ("sections", sections)]);
     let index = folder.path("index.html");
     write_file(&index, page)?;
-    let path = folder.path(LIST);
-    let list = List { program: summary::PROGRAM, version: env!("CARGO_PKG_VERSION"), exhibits };
-    let text = serde_json::to_string_pretty(&list).map_err(ExportError::io("write", &path))? + "\n";
-    write_file(&path, text)?;
-    Ok(vec![index, path])
+    Ok(vec![index, summary::write_signed(folder, LIST, &List { exhibits })?])
 }
 
 fn card(folder: &OutputFolder, exhibit: &Exhibit) -> Result<String, ExportError> {

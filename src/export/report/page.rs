@@ -12,6 +12,7 @@ use serde_json::json;
 
 use super::super::OutputFolder;
 use super::super::error::ExportError;
+pub(super) use super::super::figures::escaped;
 use super::super::manifest::create_buffered;
 use super::plot::Plot;
 use super::view::View;
@@ -199,10 +200,6 @@ pub(super) fn filled(template: &str, parts: &[(&str, String)]) -> String {
         page += rest;
     }
     page
-}
-
-pub(super) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 fn table_html(table: &Table) -> String {

@@ -10,7 +10,7 @@ use super::super::bonds::pairs;
 use super::super::error::ExportError;
 use super::super::figures::SERIES;
 use super::super::load;
-use super::super::{OutputFolder, Results, Summary};
+use super::super::{OutputFolder, Results, Signed, Summary};
 use super::encode::GROUP;
 use super::encoded;
 use super::frames::{Channel, Frame, Frames, MOST_FRAMES};
@@ -420,16 +420,15 @@ pub fn write(
 }
 
 fn verdict(outcome: &Outcome) -> (bool, String) {
-    let step = outcome.engine.step();
-    match &outcome.reason {
-        StopReason::Equilibrium if outcome.solved.is_some() => (true, "in equilibrium".into()),
-        StopReason::Equilibrium => (true, format!("in equilibrium at step {step}")),
-        StopReason::Steps => (true, format!("all {step} steps done")),
-        StopReason::Unsettled => (false, "the solver ended short of its tolerance".into()),
-        StopReason::Stuck(why) => (false, format!("in equilibrium at increment {step}, but not {why}")),
-        StopReason::Interrupted => (false, format!("interrupted at step {step}")),
-        StopReason::Diverged(divergence) => (false, divergence.to_string()),
-    }
+    let (reason, step) = (&outcome.reason, outcome.engine.step());
+    let words = match reason {
+        StopReason::Equilibrium if outcome.solved.is_none() => format!("{reason} at step {step}"),
+        StopReason::Interrupted => format!("{reason} at step {step}"),
+        StopReason::Steps => format!("all {step} steps done"),
+        StopReason::Stuck(_) => format!("in equilibrium at increment {step}, but {reason}"),
+        _ => reason.to_string(),
+    };
+    (reason.is_good(), words)
 }
 
 /// A sentence on the frames that are shown and those that are not.
@@ -538,7 +537,7 @@ fn texts(scene: &Scene, summary: &Summary) -> Vec<(String, String)> {
         texts.push(("Notes of the scene".into(), scene.raw.notes.trim().to_owned()));
     }
     texts.push(("Scene, with its defaults and overrides".into(), scene_text(&scene.raw)));
-    let mut value = serde_json::to_value(summary).unwrap_or_default();
+    let mut value = serde_json::to_value(Signed::new(summary)).unwrap_or_default();
     if let serde_json::Value::Object(table) = &mut value {
         table.remove("scene");
     }

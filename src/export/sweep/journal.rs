@@ -71,7 +71,7 @@ impl Begun {
     /// A sweep of this scene, which is the one without the variations; `plan_digest` is of the first run that can be
     /// laid out.
     pub fn new(request: SweepRequest, scene: &Scene, plan_digest: Option<u64>) -> Self {
-        let (program, version) = (summary::PROGRAM.to_owned(), env!("CARGO_PKG_VERSION").to_owned());
+        let (program, version) = (summary::PROGRAM.to_owned(), summary::VERSION.to_owned());
         Self { program, version, scene_crc32: crc32(scene), plan_digest, request }
     }
 
@@ -247,10 +247,7 @@ impl Journal {
     /// # Errors
     /// A file that cannot be written, or an unfinished sweep in the place.
     pub fn begin(folder: &mut OutputFolder, begun: &Begun, rows: &[Row]) -> Result<Self, ExportError> {
-        let path = folder.path(REQUEST);
-        let mut text = serde_json::to_string_pretty(begun).map_err(ExportError::io("write", &path))?;
-        text.push('\n');
-        write_file(&path, text)?;
+        summary::write_json(folder, REQUEST, begun)?;
         let path = folder.path(RUNS);
         let lines: Result<Vec<String>, _> = rows.iter().map(line).collect();
         write_file(&path, lines.map_err(ExportError::io("write", &path))?.concat())?;

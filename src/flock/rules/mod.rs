@@ -145,12 +145,6 @@ impl Rule {
     pub const MATERIAL: Rule =
         Rule { mean: Mean::Material { rotation: Rotation::Small }, poisson: None, feedback: None };
 
-    /// Whether the rule is the unadorned mean of Eq. 1, for which sweeps have a faster path that
-    /// gives the same bits.
-    pub fn is_plain_barycentre(&self) -> bool {
-        *self == Self::BARYCENTRE
-    }
-
     /// Where the particle moves \[length, world frame\]. A particle without neighbours stays: no target
     /// is computed from nothing. Finite input gives finite output unless the result itself overflows.
     #[inline]

@@ -3,9 +3,8 @@
 use crate::messages::flockform_msgs::{FormationState, MemberState};
 use crate::messages::geometry_msgs::{Point, Vector3};
 use crate::messages::std_msgs::Header;
+use crate::swarm::control::Control;
 use crate::swarm::control::state::FormationState as State;
-use crate::swarm::control::{Control, Mode};
-use crate::swarm::watch::Health;
 
 /// The state after the last tick, which took `elapsed` \[s\].
 pub fn message(control: &Control, name: &str, header: Header, elapsed: f64) -> FormationState {
@@ -14,7 +13,7 @@ pub fn message(control: &Control, name: &str, header: Header, elapsed: f64) -> F
     let members = state.members.iter().zip(names).map(|(member, name)| MemberState {
         name: name.clone(),
         role: if member.leads { MemberState::LEADER } else { MemberState::FOLLOWER },
-        health: health(member.health),
+        health: member.health.number(),
         position: point(member.position),
         target: point(member.target),
         settled: point(member.settled),
@@ -31,11 +30,7 @@ pub fn message(control: &Control, name: &str, header: Header, elapsed: f64) -> F
         header,
         formation: name.to_owned(),
         tick: state.tick,
-        mode: match state.mode {
-            Mode::Running => FormationState::RUNNING,
-            Mode::EmergencyStopped => FormationState::EMERGENCY_STOPPED,
-            Mode::Inactive => FormationState::INACTIVE,
-        },
+        mode: state.mode.number(),
         formation_error: state.formation_error.unwrap_or(f64::NAN),
         clearance: state.clearance,
         pe1_sum: state.pe1_sum,
@@ -53,40 +48,4 @@ fn point(place: Option<[f64; 2]>) -> Point {
 fn vector(way: Option<[f64; 2]>) -> Vector3 {
     let Point { x, y, z } = point(way);
     Vector3 { x, y, z }
-}
-
-fn health(health: Health) -> u8 {
-    match health {
-        Health::Waiting => MemberState::WAITING,
-        Health::Fresh => MemberState::FRESH,
-        Health::Held => MemberState::HELD,
-        Health::Degraded => MemberState::DEGRADED,
-        Health::Stopped => MemberState::STOPPED,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::swarm::control::state::published_flags;
-    use crate::swarm::control::{NEIGHBOUR_LOST, POSE_REJECTED, TRIMMED};
-    use crate::swarm::safety::Flags;
-
-    #[test]
-    fn the_bits_of_the_loop_are_those_of_the_message() {
-        let pairs = [
-            (Flags::SPEED_LIMITED, MemberState::SPEED_LIMITED),
-            (Flags::ACCELERATION_LIMITED, MemberState::ACCELERATION_LIMITED),
-            (Flags::GEOFENCED, MemberState::GEOFENCED),
-            (Flags::SEPARATED, MemberState::SEPARATED),
-            (Flags::OBSTRUCTED, MemberState::OBSTRUCTED),
-            (Flags::RESOLVING_DEADLOCK, MemberState::RESOLVING_DEADLOCK),
-            (NEIGHBOUR_LOST, MemberState::NEIGHBOUR_LOST),
-            (TRIMMED, MemberState::TRIMMED),
-            (POSE_REJECTED, MemberState::POSE_REJECTED),
-        ];
-        for (own, wire) in pairs {
-            assert_eq!(published_flags(own), wire);
-        }
-    }
 }

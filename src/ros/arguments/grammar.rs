@@ -130,8 +130,6 @@ fn unknown(flag: String) -> RosArgumentError {
         let guess = if flag.contains(":=") { "--remap" } else { "--params-file" };
         return RosArgumentError::StrayWord { word: flag, guess };
     }
-    let likeness = |known: &&str| strsim::jaro_winkler(known, &flag);
-    let nearest = FLAGS.into_iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
-    let nearest = nearest.filter(|known| flag.len() > 2 && likeness(known) > 0.8);
+    let nearest = text::nearest(&flag, &FLAGS).filter(|_| flag.len() > 2);
     RosArgumentError::UnknownFlag { flag, nearest }
 }

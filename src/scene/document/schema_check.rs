@@ -8,12 +8,10 @@ use serde_json::{Map, Number, Value};
 use crate::scene::document::problem::{Problem, SceneError};
 use crate::scene::document::schema_rule::{OtherKeys, Rule, Variants, any_of, listed, one_of};
 use crate::scene::document::{Content, Document, Node, child_path, entry};
+use crate::scene::text::nearest;
 
 /// Branches of an untagged enum are tried out only this many enums deep, since the tries multiply.
 const NESTED_TRIALS: usize = 2;
-
-/// No key is suggested for a word longer than this.
-const LONGEST_MISSPELLING: usize = 64;
 
 /// The value of `root`, a node of `document`, if it fits `schema`.
 pub(crate) fn check(document: &Document, root: &Node, schema: &Value) -> Result<Value, SceneError> {
@@ -375,27 +373,6 @@ const RENAMED: [(&str, &str); 8] = [
 fn renamed<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
     let (_, now) = RENAMED.into_iter().find(|(then, _)| *then == word)?;
     candidates.iter().copied().find(|candidate| *candidate == now)
-}
-
-/// The candidate that `word` most probably misspells or abbreviates, if any is near enough: a mere guess would mislead
-/// more than none.
-fn nearest<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
-    if word.len() > LONGEST_MISSPELLING {
-        return None;
-    }
-    let folded = |text: &str| text.to_lowercase().replace('-', "_");
-    let word = folded(word);
-    let distance = |candidate: &&'a str| {
-        let candidate = folded(candidate);
-        let distance = strsim::osa_distance(&word, &candidate);
-        let length = word.chars().count().max(candidate.chars().count());
-        let shorter = word.chars().count().min(candidate.chars().count());
-        let abbreviates = shorter >= 3 && (word.starts_with(&candidate) || candidate.starts_with(&word));
-        // Beyond a third of the letters, a suggestion is a guess.
-        (distance < length && (distance <= (length / 3).max(1) || abbreviates)).then_some(distance)
-    };
-    let scored = candidates.iter().filter_map(|candidate| Some((distance(candidate)?, *candidate)));
-    scored.min_by_key(|(distance, _)| *distance).map(|(_, candidate)| candidate)
 }
 
 #[cfg(test)]

@@ -172,14 +172,6 @@ impl Reference {
         self.solution.strain_energy()
     }
 
-    /// Von Mises stress \[force / length^2\] there.
-    ///
-    /// # Errors
-    /// As [`Reference::stress_at`].
-    pub fn von_mises_at(&self, places: &Vectors) -> Result<Vec<f64>, ReferenceError> {
-        Ok(self.stress_at(places)?.iter().map(Stress::von_mises).collect())
-    }
-
     /// Stress \[force / length^2\] of the truth itself at places of the shape or less than a spacing outside
     /// it, shape \[places\]; of a body that turns, in axes that turn with it. What a rule is measured against is coarser: the stress that the cells have if their
     /// corners go where the truth takes them ([`super::measures::von_mises`]).

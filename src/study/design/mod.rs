@@ -48,11 +48,12 @@ pub enum DesignError {
 /// How values are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Sampling {
-    /// Each key's range, or list, is cut into as many equal parts as there are runs, and each part is drawn from once.
+    /// One from each of as many equal parts of every range, or list, as there are runs
     #[default]
     LatinHypercube,
-    /// Independent and uniform.
+    /// Independent and uniform
     Random,
 }
 

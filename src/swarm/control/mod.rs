@@ -32,12 +32,16 @@ pub enum Mode {
     Inactive,
 }
 
-/// A neighbour's pose was not usable. This flag and the next two add to those of the filter ([`Flags`]).
-pub const NEIGHBOUR_LOST: u32 = 64;
-/// Straying neighbours were left out.
-pub const TRIMMED: u32 = 128;
-/// A pose was rejected since the last tick.
-pub const POSE_REJECTED: u32 = 256;
+impl Mode {
+    /// The number in messages and in shared memory.
+    pub const fn number(self) -> u8 {
+        match self {
+            Mode::Running => 0,
+            Mode::EmergencyStopped => 2,
+            Mode::Inactive => 3,
+        }
+    }
+}
 
 /// The part of a loop's state that outlasts its process.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -384,7 +388,7 @@ impl Control {
                 *flags |= self.filtered[member].0;
             }
             if std::mem::take(&mut self.rejected[member]) {
-                *flags |= POSE_REJECTED;
+                *flags |= Flags::POSE_REJECTED;
             }
         }
     }
@@ -453,7 +457,7 @@ impl Control {
             let lost = self.formation.neighbours(member).any(|k| !self.usable[k]);
             let target = if self.max_faulty > 0 {
                 let (target, trimmed) = self.resilient_target(member, &seen);
-                self.flags[member] |= if trimmed { TRIMMED } else { 0 };
+                self.flags[member] |= if trimmed { Flags::TRIMMED } else { 0 };
                 Some(target)
             } else if lost {
                 self.formation.target_among(member, &seen, |_| true)
@@ -461,7 +465,7 @@ impl Control {
                 continue;
             };
             if lost {
-                self.flags[member] |= NEIGHBOUR_LOST;
+                self.flags[member] |= Flags::NEIGHBOUR_LOST;
             }
             self.wanted.set(member, target.unwrap_or(self.present.get(member)));
         }

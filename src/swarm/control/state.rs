@@ -1,6 +1,6 @@
 //! The state after the last tick, as every edge publishes it.
 
-use super::{Control, Mode, NEIGHBOUR_LOST, POSE_REJECTED, TRIMMED};
+use super::{Control, Mode};
 use crate::flock::vectors::distance;
 use crate::swarm::safety::Flags;
 use crate::swarm::watch::Health;
@@ -106,9 +106,9 @@ const PUBLISHED: u32 = Flags::SPEED_LIMITED
     | Flags::SEPARATED
     | Flags::OBSTRUCTED
     | Flags::RESOLVING_DEADLOCK
-    | NEIGHBOUR_LOST
-    | TRIMMED
-    | POSE_REJECTED;
+    | Flags::NEIGHBOUR_LOST
+    | Flags::TRIMMED
+    | Flags::POSE_REJECTED;
 
 /// The loop's bits as they are published.
 pub fn published_flags(bits: u32) -> u32 {
@@ -122,7 +122,7 @@ mod tests {
     #[test]
     fn the_flags_of_the_filter_and_of_the_loop_are_published_in_one_order() {
         assert_eq!(published_flags(u32::MAX), 0b1_1111_1111, "nine flags, each a bit of its own");
-        assert_eq!(published_flags(Flags::SPEED_LIMITED | POSE_REJECTED), 1 | 256);
+        assert_eq!(published_flags(Flags::SPEED_LIMITED | Flags::POSE_REJECTED), 1 | 256);
         assert_eq!(published_flags(Flags::HELD), 0, "what is no bit of the messages is not published");
     }
 }

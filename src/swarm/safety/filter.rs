@@ -9,7 +9,7 @@ use crate::flock::grid::CellGrid;
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::vectors::{Vectors, distance};
 
-/// The reasons for changing a target, as bits that may be combined; those of the message `flockform_msgs/MemberState`.
+/// The reasons for changing a target, and other events of a tick, as bits that may be combined; those of the message `flockform_msgs/MemberState`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Flags(pub u32);
 
@@ -26,6 +26,12 @@ impl Flags {
     pub const OBSTRUCTED: u32 = 16;
     /// The member keeps to the right to get around what blocks it.
     pub const RESOLVING_DEADLOCK: u32 = 32;
+    /// A neighbour's pose was not usable.
+    pub const NEIGHBOUR_LOST: u32 = 64;
+    /// Straying neighbours were left out.
+    pub const TRIMMED: u32 = 128;
+    /// A pose was rejected since the last tick.
+    pub const POSE_REJECTED: u32 = 256;
     /// The member stays without a target: its pose is not known, or the wanted target is not finite. No bit of the
     /// message.
     pub const HELD: u32 = 1 << 16;

@@ -45,6 +45,11 @@ pub enum Health {
 }
 
 impl Health {
+    /// The number in messages and in shared memory.
+    pub const fn number(self) -> u8 {
+        self as u8
+    }
+
     /// The name in reports.
     pub fn name(self) -> &'static str {
         match self {
