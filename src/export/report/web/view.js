@@ -11,6 +11,9 @@ const MOST_WAYS = 400;
 // Largest distance of the pointer from a particle that it names, in pixels.
 const REACH = 14;
 
+// Smallest radius of a robot where there are few, in pixels: seen in a wide formation, and hit.
+const LEAST_ROBOT = 3.5;
+
 // Of broken bonds, in pixels.
 export const CRACK_DASH = [3, 2];
 
@@ -83,7 +86,7 @@ export class View {
   }
 
   resize() {
-    const ratio = window.devicePixelRatio || 1;
+    const ratio = shown.sharpness ?? (window.devicePixelRatio || 1);
     const [width, height] = [this.box.clientWidth, this.box.clientHeight];
     for (const canvas of [this.under, this.middle, this.over]) {
       const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
@@ -118,7 +121,8 @@ export class View {
     }
     show.shade(body, shades);
     const scale = show.camera.scale * ratio;
-    if (animation.radii.length) for (let i = 0; i < body.count; i++) radii[i] = Math.max(animation.radii[i] * scale, 1.5 * ratio);
+    const least = (body.count <= MOST_WAYS ? LEAST_ROBOT : 1.5) * ratio;
+    if (animation.radii.length) for (let i = 0; i < body.count; i++) radii[i] = Math.max(animation.radii[i] * scale, least);
     else radii.fill(Math.min(Math.max((show.layers.surface ? 0.13 : 0.27) * animation.spacing * scale, 0.7), 9 * ratio));
     if (show.layers.points) body.roles().forEach((role, i) => (this.marks[i] = this.markOfRole[role]));
     const bondsFrom = 2 * body.brokenBonds();
