@@ -129,7 +129,8 @@ export class View {
     const trianglesFrom = 3 * body.trianglesPerCell * body.tornCells();
     this.painter.draw({
       places, values: shades, radii, marks: this.marks,
-      palette: show.palette, isFlat: show.isFlat, layers: show.layers, spacing: animation.spacing * scale,
+      palette: show.palette, isFlat: show.isFlat, layers: show.layers,
+      spacing: animation.radii.length ? Math.max(animation.spacing * scale, 2 * least) : animation.spacing * scale,
       camera: { x: show.camera.x - origin[0], y: show.camera.y - origin[1], scale },
       bondsFrom, bondCount: body.bonds.length - bondsFrom,
       trianglesFrom, triangleCount: body.triangles.length - trianglesFrom,
@@ -216,7 +217,8 @@ export class View {
   drawGrid(pen) {
     const { camera } = this.show;
     const [halfWidth, halfHeight] = [this.width / 2 / camera.scale, this.height / 2 / camera.scale];
-    const across = ticks(camera.x - halfWidth, camera.x + halfWidth, this.width / 110);
+    // On a phone too there are two of them, whose distance is that of the others.
+    const across = ticks(camera.x - halfWidth, camera.x + halfWidth, Math.max(this.width / 110, 4));
     const step = across.length > 1 ? across[1] - across[0] : 1;
     const up = [];
     for (let k = Math.ceil((camera.y - halfHeight) / step); k * step <= camera.y + halfHeight; k++) up.push(k * step);
