@@ -204,7 +204,8 @@ fn hands_that_take_and_take_are_refused_before_they_fill_the_memory() {
     let mut body = begun("tension", &["body.shape={ kind = \"grid\", columns = 2, rows = 30000 }"]);
     let clamped = (0..body.engine().body().count()).find(|&i| body.engine().roles()[i].name() == "clamped");
     let grab = Command::Grab { particle: clamped.expect("held"), alone: false };
-    let refused = (0..1000).find_map(|_| body.perform(0, &grab).err());
+    let drag = Command::Drag { by: [0.1, 0.0] };
+    let refused = (0..1000).find_map(|_| body.perform(0, &grab).and_then(|()| body.perform(0, &drag)).err());
     assert!(refused.expect("refused in the end").0.contains("too much"));
     ask(&mut body, r#"{"do":"undo"}"#);
 }
@@ -265,7 +266,10 @@ fn a_drag_while_a_body_stands_still_is_shown_at_once_and_the_next_step_goes_ther
         ask(&mut body, r#"{"do":"release"}"#);
         assert_eq!(body.undoable(), undoable + 1);
         assert_near(shown(&body, 66), there);
-        assert_replays(&body);
+        if before > 0 {
+            // A run takes one step at least.
+            assert_replays(&body);
+        }
         ask(&mut body, r#"{"do":"undo"}"#);
         assert_near(shown(&body, 66), [x, y]);
 

@@ -194,6 +194,10 @@ impl State {
         hand.motion = Some(raw_motion(&lead.frames));
         // A place that no step has reached yet is the next step's.
         let from = self.next_from().max(lead.last_step() + 1);
+        // Of several hands before a step the last has them.
+        let changes = self.engine.changes();
+        let is_other = |one: &LetGo| changes[one.change].particles != changes[lead.change].particles;
+        self.let_go.retain(is_other);
         self.let_go.push(LetGo { change: lead.change, until: from - 1, follows });
         if !follows {
             return;

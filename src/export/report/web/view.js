@@ -90,7 +90,10 @@ export class View {
     const [width, height] = [this.box.clientWidth, this.box.clientHeight];
     for (const canvas of [this.under, this.middle, this.over]) {
       const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
-      if (canvas.width !== w || canvas.height !== h) Object.assign(canvas, { width: w, height: h });
+      if (canvas.width === w && canvas.height === h) continue;
+      Object.assign(canvas, { width: w, height: h });
+      // It is empty now, also where it soon is as large as before.
+      [this.below, this.isClear] = ["", false];
     }
     Object.assign(this, { ratio, width, height });
   }
