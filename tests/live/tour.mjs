@@ -238,6 +238,9 @@ async function design(page) {
   await settled(page);
   await page.check("#design-leads");
   await page.locator(".canvas").scrollIntoViewIfNeeded();
+  // Beside the formation there is room for another robot once the view is zoomed out.
+  for (const _ of [1, 2]) await page.click("#zoom-out");
+  await page.waitForFunction(() => window.report.views[0].show.camera === window.report.state.camera);
   const click = async (what) => page.mouse.click(...(await onScreen(page, what)));
   const pull = async (from, to) => {
     await page.mouse.move(...(await onScreen(page, from)));
