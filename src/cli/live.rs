@@ -14,7 +14,7 @@ use flockform::live::server::Server;
 use flockform::live::session::Session;
 use flockform::live::swarm::Swarm;
 use flockform::record::body::BodyMessages;
-use flockform::record::{About, Shared};
+use flockform::record::{About, Recording, Shared};
 use flockform::scene::Scene;
 use flockform::scene::swarm::Swarm as SwarmFile;
 use flockform::swarm::control::Control;
@@ -67,6 +67,13 @@ pub fn live(arguments: &LiveArguments) -> Result<ExitCode, Refusal> {
     close(door);
     let session = served?;
     if let Some(recording) = recording {
+        if session.frame(&[]).clock == 0.0 {
+            // Its file would be run to its end, which nobody has done.
+            let what = if session.is_body() { "no step was taken" } else { "no period was flown" };
+            recording.take().map_or(Ok(()), Recording::discard)?;
+            say(&format!("{what}: nothing is recorded\n"))?;
+            return Ok(ExitCode::SUCCESS);
+        }
         let recorded = record(&*session, &recording, from.as_deref());
         say(&recording::close(Some(recording))?)?;
         recorded?;

@@ -15,7 +15,6 @@ use crate::engine::Engine;
 use crate::export::report::RunRecorder;
 use crate::export::report::view::View;
 use crate::flock::action::{Action, ActionKind};
-use crate::flock::role::Role;
 use crate::flock::rules::Mean;
 use crate::scene::raw::*;
 use crate::scene::{Scene, SceneError, is_changeable};
@@ -61,20 +60,22 @@ impl Body {
         if !role.is_body() {
             return Err(format!("a {} particle cannot be led", role.name()).into());
         }
-        let particles = if alone { vec![particle] } else { self.history.now.held_with(particle) };
-        self.history.now.require_room(particles.len())?;
         self.release(viewer);
-        self.history.keep();
-        self.history.now.take(viewer, particles, role == Role::Follower);
-        Ok(())
+        self.history.now.grab(viewer, particle, alone)
     }
 
     fn drag(&mut self, viewer: Viewer, by: [f64; 2]) -> Result<(), Refused> {
         let (low, high) = self.history.now.engine.body().bounds();
         let farthest = FARTHEST * f64::hypot(high[0] - low[0], high[1] - low[1]).max(1e-300);
-        let grab = self.history.now.grabs.get_mut(&viewer).ok_or("nothing is held")?;
-        grab.by = by.map(|along| along.clamp(-farthest, farthest));
-        self.history.now.require_room(0)
+        self.history.now.drag(viewer, by.map(|along| along.clamp(-farthest, farthest)))
+    }
+
+    /// Leads what hands have moved. That one began to is a thing to undo.
+    fn lead(&mut self) {
+        if self.history.now.begins_to_lead() {
+            self.history.keep();
+        }
+        self.history.now.lead();
     }
 
     fn cut(&mut self, cut: ([f64; 2], [f64; 2])) -> Result<(), Refused> {
@@ -135,10 +136,8 @@ impl Body {
 
 impl Session for Body {
     fn advance(&mut self) -> Result<(), String> {
+        self.lead();
         let state = &mut self.history.now;
-        for grab in state.grabs.values_mut() {
-            grab.hold(&mut state.engine);
-        }
         state.engine.advance();
         match state.bounds.divergence(&state.engine) {
             None => Ok(()),
@@ -165,6 +164,7 @@ impl Session for Body {
     }
 
     fn release(&mut self, viewer: Viewer) {
+        self.lead();
         self.history.now.let_go(viewer);
     }
 
@@ -181,7 +181,12 @@ impl Session for Body {
         let engine = &self.history.now.engine;
         let (present, reference) = (engine.present(), &engine.body().reference);
         let moved = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(n, t)| (n - t) as f32).collect();
-        let places = [moved(&present.x, &reference.x), moved(&present.y, &reference.y)];
+        let mut places: [Vec<f32>; 2] = [moved(&present.x, &reference.x), moved(&present.y, &reference.y)];
+        // A hand is not to wait for the next step, least of all where the body stands still.
+        for (i, by) in self.history.now.ahead() {
+            let (now, then) = (present.get(i), reference.get(i));
+            (0..2).for_each(|axis| places[axis][i] = (now[axis] + by[axis] - then[axis]) as f32);
+        }
         let of = |name: &str| -> Vec<f32> {
             let value = |i: usize| match name {
                 "pe2" => engine.pe2(i),

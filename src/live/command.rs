@@ -157,6 +157,11 @@ impl Command {
         command.check().map(|()| command)
     }
 
+    /// Whether it moves what a hand holds.
+    pub(super) fn moves_hand(&self) -> bool {
+        matches!(self, Command::Drag { .. } | Command::Squeeze { .. })
+    }
+
     fn check(&self) -> Result<(), String> {
         let is_text = |text: &str| text.len() <= 200 && !text.contains(char::is_control);
         let holds = match self {

@@ -1,5 +1,6 @@
 //! Runs a session: steps at the speed asked for, what viewers ask in between, and the latest state for all of them.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -60,6 +61,8 @@ pub struct Conductor {
     layout: Option<u64>,
     /// Why it goes on no further.
     stopped: Option<String>,
+    /// Viewers whose last grasp was refused: what they drag is nothing, which they have been told.
+    empty_handed: BTreeSet<Viewer>,
 }
 
 /// Sends every viewer away when it is dropped, by a panic too.
@@ -109,6 +112,7 @@ impl Conductor {
             lineage: 0,
             layout: None,
             stopped: None,
+            empty_handed: BTreeSet::new(),
         }
     }
 
@@ -192,6 +196,7 @@ impl Conductor {
             Request::Come => true,
             Request::Gone(viewer) => {
                 self.session.release(viewer);
+                self.empty_handed.remove(&viewer);
                 true
             }
             Request::Command(viewer, command) => self.perform(viewer, &command),
@@ -219,7 +224,14 @@ impl Conductor {
 
     /// Does something with the session, or says why not.
     fn act(&mut self, viewer: Viewer, command: &Command) {
+        if command.moves_hand() && self.empty_handed.contains(&viewer) {
+            return;
+        }
+        self.empty_handed.remove(&viewer);
         if let Err(refused) = self.session.perform(viewer, command) {
+            if matches!(command, Command::Grab { .. } | Command::GrabObstacle { .. }) {
+                self.empty_handed.insert(viewer);
+            }
             self.board.send(viewer, &answered(Err(refused.0)));
             return;
         }

@@ -96,7 +96,21 @@ impl<S: State> History<S> {
 
     /// Keeps the state, to be returned to. Hands do not come back.
     pub(super) fn keep(&mut self) {
-        let mut state = self.now.clone();
+        self.keep_state(self.now.clone());
+    }
+
+    /// Does something that undo takes back; what is refused is nothing to undo.
+    ///
+    /// # Errors
+    /// As `act`.
+    pub(super) fn attempt(&mut self, act: impl FnOnce(&mut S) -> Result<(), Refused>) -> Result<(), Refused> {
+        let before = self.now.clone();
+        act(&mut self.now)?;
+        self.keep_state(before);
+        Ok(())
+    }
+
+    fn keep_state(&mut self, mut state: S) {
         state.let_go_all();
         let size = |before: &[Before<S>]| before.iter().map(|one| one.state.size()).sum::<usize>();
         let room = MOST_SIZE.saturating_sub(state.size());

@@ -152,7 +152,17 @@ impl Session for Monitor {
     fn frame(&self, _wanted: &[bool]) -> Frame {
         let mut clearance = Vec::new();
         self.control.clearance(&mut clearance);
-        swarm::frame(&self.control, &self.control.last_places(), &clearance, self.control.program_time())
+        let target = |m: usize| self.control.target(m);
+        let mut frame = swarm::frame(
+            &self.control,
+            &self.control.last_places(),
+            &clearance,
+            &target,
+            self.control.program_time(),
+        );
+        // Poses alone tell no motion.
+        frame.channels.extend([None, None]);
+        frame
     }
 
     fn roles(&self) -> Vec<u8> {
@@ -179,7 +189,7 @@ impl Session for Monitor {
     }
 
     fn view(&self) -> View {
-        FlightRecorder::still(&self.file, &self.control, &self.control.last_places())
+        FlightRecorder::still(&self.file, &self.control, &self.control.last_places(), false)
     }
 
     fn title(&self) -> (&str, &str) {

@@ -13,7 +13,7 @@ use super::session::{Frame, Refused, Session, Viewer};
 use crate::export::report::flight::{FlightRecorder, from_places};
 use crate::export::report::view::View;
 use crate::flock::role::Role;
-use crate::flock::vectors::Vectors;
+use crate::flock::vectors::{Vectors, distance};
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm as File;
 use crate::scene::swarm::raw::{RawCommand, RawCommandKind, RawFault, RawFaultKind};
@@ -23,10 +23,13 @@ use crate::swarm::flight::{Alarm, Flight, FlightCommand};
 use crate::swarm::plan::Exactness;
 
 /// Quantities that come with every frame: a swarm is small.
-pub const CHANNELS: [&str; 7] = ["clearance", "away", "age", "pe1", "strain", "target_dx", "target_dy"];
+pub const CHANNELS: [&str; 9] =
+    ["clearance", "away", "age", "pe1", "strain", "target_dx", "target_dy", "speed", "acceleration"];
 
 /// Keys of the flight that may change while robots fly: noise, delay and loss.
 const CHANNEL_KEYS: [&str; 3] = ["flight.noise", "flight.delay", "flight.loss"];
+/// Robots that an alarm names; the page marks all of them.
+const MOST_NAMED: usize = 3;
 /// Most commands and faults that are kept.
 const MOST_COMMANDS: usize = 100_000;
 
@@ -41,6 +44,8 @@ struct Hand {
     held: Held,
     /// Where the hand has it, from where it was taken \[m\].
     by: [f64; 2],
+    /// Whether it has moved it: all that it does to it is undone as one.
+    has_moved: bool,
 }
 
 /// A thing that can be held, and where it was taken \[m\].
@@ -64,6 +69,8 @@ struct State {
     /// Things that viewers hold.
     hands: BTreeMap<Viewer, Hand>,
     alarms: Vec<Alarm>,
+    /// Velocities before the last period \[m/s\].
+    before: Vec<[f64; 2]>,
 }
 
 impl Swarm {
@@ -119,34 +126,45 @@ impl Swarm {
     }
 
     fn take(&mut self, viewer: Viewer, held: Held) {
-        self.history.keep();
-        self.history.now.hands.insert(viewer, Hand { held, by: [0.0; 2] });
+        self.history.now.hands.insert(viewer, Hand { held, by: [0.0; 2], has_moved: false });
     }
 
     fn drag(&mut self, viewer: Viewer, by: [f64; 2]) -> Result<(), Refused> {
-        let now = &mut self.history.now;
-        let Hand { held, by: last } = now.hands.get(&viewer).cloned().ok_or("nothing is held")?;
-        if by == last {
+        let hand = self.history.now.hands.get(&viewer).cloned().ok_or("nothing is held")?;
+        if by == hand.by {
             return Ok(());
         }
-        now.require_room()?;
-        match &held {
-            Held::Leaders(leaders) => now.lead_all(leaders, |[x, y]| [x + by[0], y + by[1]])?,
-            Held::Obstacle(obstacle, [x, y]) => now.move_obstacle(*obstacle, [x + by[0], y + by[1]])?,
-        }
-        now.hands.insert(viewer, Hand { held, by });
-        Ok(())
+        let held = hand.held.clone();
+        let act = |now: &mut State| match &held {
+            Held::Leaders(leaders) => now.lead_all(leaders, |[x, y]| [x + by[0], y + by[1]]),
+            Held::Obstacle(obstacle, [x, y]) => now.move_obstacle(*obstacle, [x + by[0], y + by[1]]),
+        };
+        self.move_held(viewer, Hand { by, ..hand }, act)
     }
 
     fn squeeze(&mut self, viewer: Viewer, by: [f64; 2]) -> Result<(), Refused> {
-        let now = &mut self.history.now;
-        let Some(Hand { held: Held::Leaders(leaders), .. }) = now.hands.get(&viewer).cloned() else {
+        let hand = self.history.now.hands.get(&viewer).cloned();
+        let Some(hand @ Hand { held: Held::Leaders(_), .. }) = hand else {
             return Err("no leaders are held".into());
         };
-        now.require_room()?;
+        let Held::Leaders(leaders) = hand.held.clone() else { return Ok(()) };
         let share = 1.0 / leaders.len() as f64;
         let middle = [0, 1].map(|k| leaders.iter().map(|(_, place)| place[k] * share).sum::<f64>());
-        now.lead_all(&leaders, |place| [0, 1].map(|k| middle[k] + by[k] * (place[k] - middle[k])))
+        let to = |place: [f64; 2]| [0, 1].map(|k| middle[k] + by[k] * (place[k] - middle[k]));
+        self.move_held(viewer, hand, |now| now.lead_all(&leaders, to))
+    }
+
+    /// Moves what a viewer holds to where its hand is now.
+    fn move_held(
+        &mut self,
+        viewer: Viewer,
+        hand: Hand,
+        act: impl FnOnce(&mut State) -> Result<(), Refused>,
+    ) -> Result<(), Refused> {
+        self.history.now.require_room()?;
+        if hand.has_moved { act(&mut self.history.now) } else { self.history.attempt(act) }?;
+        self.history.now.hands.insert(viewer, Hand { has_moved: true, ..hand });
+        Ok(())
     }
 
     fn channel(&mut self, key: &str, value: &str) -> Result<(), Refused> {
@@ -191,10 +209,11 @@ impl Swarm {
 
 impl Session for Swarm {
     fn advance(&mut self) -> Result<(), String> {
-        let State { file, flight, alarms, .. } = &mut self.history.now;
-        let before = flight.fleet().places();
+        let State { file, flight, alarms, before, .. } = &mut self.history.now;
+        let places = flight.fleet().places();
+        *before = velocities(flight);
         flight.step();
-        *alarms = Alarm::now(file, flight, &before);
+        *alarms = Alarm::now(file, flight, &places);
         Ok(())
     }
 
@@ -241,7 +260,15 @@ impl Session for Swarm {
         let (control, fleet) = (self.flight().control(), self.flight().fleet());
         let (places, mut clearance) = (fleet.places(), Vec::new());
         control.filter().clearance(&places, &mut clearance);
-        frame(control, &places, &clearance, fleet.time())
+        let sent = self.history.now.sent();
+        let target = |m: usize| sent.get(&m).copied().or_else(|| control.target(m));
+        let mut frame = frame(control, &places, &clearance, &target, fleet.time());
+        let now = velocities(self.flight());
+        let speed = now.iter().map(|[x, y]| x.hypot(*y) as f32).collect();
+        let changes = now.iter().zip(&self.history.now.before);
+        let acceleration = changes.map(|(now, before)| (distance(*now, *before) / control.period()) as f32);
+        frame.channels.extend([Some(speed), Some(acceleration.collect())]);
+        frame
     }
 
     fn roles(&self) -> Vec<u8> {
@@ -294,7 +321,7 @@ impl Session for Swarm {
 
     fn view(&self) -> View {
         let State { file, flight, .. } = &self.history.now;
-        FlightRecorder::still(file, flight.control(), &flight.fleet().places())
+        FlightRecorder::still(file, flight.control(), &flight.fleet().places(), true)
     }
 
     fn title(&self) -> (&str, &str) {
@@ -310,14 +337,24 @@ impl Session for Swarm {
     }
 }
 
-/// The state of every robot at these places \[m\], with all channels; displacements are from the nominal places.
-pub(super) fn frame(control: &Control, places: &Vectors, clearance: &[f64], clock: f64) -> Frame {
+fn velocities(flight: &Flight) -> Vec<[f64; 2]> {
+    flight.fleet().robots().iter().map(|robot| robot.velocity).collect()
+}
+
+/// The state of every robot at these places \[m\], with all channels but those of motion, the last two; displacements
+/// are from the nominal places.
+pub(super) fn frame(
+    control: &Control,
+    places: &Vectors,
+    clearance: &[f64],
+    target: &dyn Fn(usize) -> Option<[f64; 2]>,
+    clock: f64,
+) -> Frame {
     let start = &control.formation().places;
     let measures = control.formation().measures(places);
     let away = from_places(control, places);
-    let to_target = |m: usize, axis: usize| {
-        control.target(m).map_or(f64::NAN, |target| target[axis] - start.get(m)[axis])
-    };
+    let to_target =
+        |m: usize, axis: usize| target(m).map_or(f64::NAN, |target| target[axis] - start.get(m)[axis]);
     let of = |name: &str, m: usize| match name {
         "clearance" => clearance[m],
         "away" => away.as_ref().map_or(f64::NAN, |away| away[m]),
@@ -332,7 +369,7 @@ pub(super) fn frame(control: &Control, places: &Vectors, clearance: &[f64], cloc
     Frame {
         clock,
         places: [moved(&places.x, &start.x), moved(&places.y, &start.y)],
-        channels: CHANNELS.into_iter().map(|name| Some(channel(name))).collect(),
+        channels: CHANNELS[..7].iter().map(|name| Some(channel(name))).collect(),
     }
 }
 
@@ -348,10 +385,20 @@ pub(super) fn in_words(alarms: &[Alarm], names: &[String]) -> (Vec<String>, Vec<
     let words = |alarm: &Alarm| {
         let robots: Vec<&str> = alarm.robots.iter().map(|&m| names[m].as_str()).collect();
         let Alarm { bound, declared, found, .. } = alarm;
-        format!("{bound}: declared {declared} m, now {found:.3} m, by {}", robots.join(" and "))
+        format!("{bound}: declared {declared} m, now {found:.3} m, by {}", listed(&robots))
     };
     let robots = alarms.iter().flat_map(|alarm| alarm.robots.iter().copied());
     (alarms.iter().map(words).collect(), robots.collect())
+}
+
+/// "a", "a, b and c", "a, b, c and 4 more".
+fn listed(names: &[&str]) -> String {
+    let (named, others) = names.split_at(names.len().min(MOST_NAMED));
+    match named {
+        _ if !others.is_empty() => format!("{} and {} more", named.join(", "), others.len()),
+        [before @ .., last] if !before.is_empty() => format!("{} and {last}", before.join(", ")),
+        _ => named.concat(),
+    }
 }
 
 impl history::State for State {
@@ -368,6 +415,7 @@ impl history::State for State {
             commands: Vec::new(),
             hands: BTreeMap::new(),
             alarms: Vec::new(),
+            before: velocities(&flight),
             flight,
             file: Arc::new(file),
         })
@@ -395,6 +443,17 @@ impl State {
             return Err("poses there would not be believed: they are beyond `poses.range`".into());
         }
         targets.into_iter().try_for_each(|(member, to)| self.lead(member, to))
+    }
+
+    /// Places that leaders were sent to since the last period \[m\]: their targets, once the next one is flown.
+    fn sent(&self) -> BTreeMap<usize, [f64; 2]> {
+        let names = &self.flight.control().formation().names;
+        let begun = self.commands.partition_point(|one| one.after < self.flight.fleet().period());
+        let sent = self.commands[begun..].iter().filter_map(|one| match &one.what {
+            RawCommandKind::Lead { robot, to } => Some((names.iter().position(|name| name == robot)?, *to)),
+            _ => None,
+        });
+        sent.collect()
     }
 
     fn move_obstacle(&mut self, obstacle: usize, by: [f64; 2]) -> Result<(), Refused> {

@@ -117,6 +117,17 @@ impl Recording {
         self.messages
     }
 
+    /// Removes the file: there was nothing to record.
+    ///
+    /// # Errors
+    /// The file cannot be removed.
+    pub fn discard(self) -> Result<(), RecordError> {
+        let Self { part, writer, .. } = self;
+        // Closed first: it writes its end as it goes.
+        drop(writer);
+        std::fs::remove_file(&part).map_err(RecordError::io("remove", &part))
+    }
+
     /// Closes the file and gives it its name.
     ///
     /// # Errors

@@ -204,7 +204,8 @@ fn hands_that_take_and_take_are_refused_before_they_fill_the_memory() {
     let mut body = begun("tension", &["body.shape={ kind = \"grid\", columns = 2, rows = 30000 }"]);
     let clamped = (0..body.engine().body().count()).find(|&i| body.engine().roles()[i].name() == "clamped");
     let grab = Command::Grab { particle: clamped.expect("held"), alone: false };
-    let refused = (0..1000).find_map(|_| body.perform(0, &grab).err());
+    let drag = Command::Drag { by: [0.1, 0.0] };
+    let refused = (0..1000).find_map(|_| body.perform(0, &grab).and_then(|()| body.perform(0, &drag)).err());
     assert!(refused.expect("refused in the end").0.contains("too much"));
     ask(&mut body, r#"{"do":"undo"}"#);
 }
@@ -239,4 +240,108 @@ fn tools_are_those_that_the_body_takes() {
         assert_eq!(begun(name, &[]).tools(), tools, "{name}");
         assert_eq!(begun(name, &[]).perform(0, &cut).is_ok(), tools.contains(&"cut"), "{name}");
     }
+}
+
+/// Where the page shows a particle, from where it was at first.
+fn shown(body: &Body, particle: usize) -> [f32; 2] {
+    body.frame(&[]).places.map(|along| along[particle])
+}
+
+fn assert_near(found: [f32; 2], expected: [f32; 2]) {
+    assert!((0..2).all(|k| (found[k] - expected[k]).abs() < 1e-6), "{found:?}, not {expected:?}");
+}
+
+#[test]
+fn a_drag_while_a_body_stands_still_is_shown_at_once_and_the_next_step_goes_there() {
+    // No role is taken before the second step.
+    for (before, steps) in [(0, 2), (10, 1)] {
+        let mut body = begun("tension", &[]);
+        step(&mut body, before);
+        let [x, y] = shown(&body, 66);
+        let (undoable, there) = (body.undoable(), [x + 1.0, y + 0.5]);
+        ask(&mut body, r#"{"do":"grab","particle":66}"#);
+        ask(&mut body, r#"{"do":"drag","by":[0.5,0.25]}"#);
+        assert_near(shown(&body, 66), [x + 0.5, y + 0.25]);
+        ask(&mut body, r#"{"do":"drag","by":[1.0,0.5]}"#);
+        ask(&mut body, r#"{"do":"release"}"#);
+        assert_eq!(body.undoable(), undoable + 1);
+        assert_near(shown(&body, 66), there);
+        if before > 0 {
+            // A run takes one step at least.
+            assert_replays(&body);
+        }
+        ask(&mut body, r#"{"do":"undo"}"#);
+        assert_near(shown(&body, 66), [x, y]);
+
+        ask(&mut body, r#"{"do":"grab","particle":66}"#);
+        ask(&mut body, r#"{"do":"drag","by":[1.0,0.5]}"#);
+        ask(&mut body, r#"{"do":"release"}"#);
+        step(&mut body, steps);
+        assert_near(body.engine().displacement(66).map(|along| along as f32), there);
+        assert_near(shown(&body, 66), there);
+        assert_replays(&body);
+        step(&mut body, 1);
+        assert_eq!(body.engine().roles()[66].name(), "follower");
+        assert!(body.engine().displacement(66)[0] < f64::from(there[0]), "its neighbours pull it back");
+        step(&mut body, 7);
+        assert_replays(&body);
+    }
+}
+
+#[test]
+fn drags_one_after_another_while_a_body_stands_still_add_up() {
+    let mut body = begun("tension", &[]);
+    step(&mut body, 10);
+    let leader = (0..144).find(|&i| body.engine().roles()[i].name() == "leader").expect("led");
+    for particle in [66, leader] {
+        let [x, y] = shown(&body, particle);
+        for by in ["[0.5,0.0]", "[0.25,0.5]"] {
+            ask(&mut body, &format!(r#"{{"do":"grab","particle":{particle}}}"#));
+            ask(&mut body, &format!(r#"{{"do":"drag","by":{by}}}"#));
+            ask(&mut body, r#"{"do":"release"}"#);
+        }
+        assert_near(shown(&body, particle), [x + 0.75, y + 0.5]);
+        step(&mut body, 1);
+        assert_near(body.engine().displacement(particle).map(|along| along as f32), [x + 0.75, y + 0.5]);
+        assert_replays(&body);
+    }
+    // Back to where it is: nothing is to come, and it is shown so.
+    let here = shown(&body, leader);
+    for by in ["[0.5,0.0]", "[-0.5,0.0]"] {
+        ask(&mut body, &format!(r#"{{"do":"grab","particle":{leader}}}"#));
+        ask(&mut body, &format!(r#"{{"do":"drag","by":{by}}}"#));
+        ask(&mut body, r#"{"do":"release"}"#);
+    }
+    assert_near(shown(&body, leader), here);
+    step(&mut body, 3);
+    assert_near(shown(&body, leader), here);
+    assert_replays(&body);
+}
+
+#[test]
+fn a_particle_that_was_just_let_go_follows_after_another_hand_too() {
+    let mut body = begun("tension", &[]);
+    step(&mut body, 10);
+    drag(&mut body, 66, [0.4, 0.2], 4);
+    assert_eq!(body.engine().roles()[66].name(), "leader", "until the next step");
+    drag(&mut body, 66, [0.4, 0.2], 3);
+    step(&mut body, 2);
+    assert_eq!(body.engine().roles()[66].name(), "follower");
+    assert_replays(&body);
+}
+
+#[test]
+fn a_drag_that_changes_nothing_is_nothing_to_undo() {
+    let mut body = begun("tension", &[]);
+    step(&mut body, 10);
+    let saved = body.saved().expect("can be written");
+    for by in [&[][..], &["[0.0,0.0]"], &["[0.5,0.5]", "[0.0,0.0]"]] {
+        ask(&mut body, r#"{"do":"grab","particle":66}"#);
+        by.iter().for_each(|by| ask(&mut body, &format!(r#"{{"do":"drag","by":{by}}}"#)));
+        ask(&mut body, r#"{"do":"release"}"#);
+        assert_eq!(body.undoable(), 0, "{by:?}");
+    }
+    assert_eq!(body.saved().expect("can be written"), saved);
+    step(&mut body, 2);
+    assert_replays(&body);
 }

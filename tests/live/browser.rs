@@ -168,6 +168,51 @@ fn an_edge_is_loaded_by_hand_and_the_body_saved() {
     assert_shown(&seen, (0..engine.body().count()).map(|i| engine.displacement(i)));
 }
 
+/// That the view is large and the clock below it in the window.
+fn assert_in_windows(seen: &Value) {
+    for (window, least) in seen["windows"].as_array().expect("measured").iter().zip([330.0, 500.0, 300.0]) {
+        assert!(window["high"].as_f64() >= Some(least) && window["below"].as_f64() <= Some(0.0), "{window}");
+        assert_eq!(window["isWide"], false);
+    }
+}
+
+#[test]
+#[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
+fn a_body_that_stands_still_is_dragged_at_once_and_keys_do_what_is_said() {
+    let folder = temporary();
+    let served = Served::scene("tension", &[], folder.path());
+    let seen = tour(&served.address, &json!({ "name": "first", "first": 66 }));
+    assert_in_windows(&seen);
+    let place =
+        |when: &str| -> Vec<f64> { serde_json::from_value(seen["still"][when].clone()).expect("two") };
+    let (before, after) = (place("before"), place("after"));
+    assert!(after[0] > before[0] + 0.3 && after[1] > before[1] + 0.3, "{}", seen["still"]);
+    assert_eq!(seen["still"]["clock"], 0.0);
+    let stepped = place("stepped");
+    assert!((0..2).all(|k| (stepped[k] - after[k]).abs() < 1e-6), "{}", seen["still"]);
+    assert_eq!(place("undone"), before);
+    assert_eq!(seen["words3"], json!(["Give KEY=VALUE, as --set takes it.", ""]));
+    assert_eq!((&seen["emptied"], &seen["counted"]), (&json!("1"), &json!(["update.damping=0.801"])));
+    let files = std::fs::read_dir(folder.path()).expect("a folder").count();
+    assert_eq!((&seen["savedOnce"], files), (&json!(true), 1));
+}
+
+#[test]
+#[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
+fn a_follower_does_not_lead_and_the_page_goes_on_saying_so() {
+    let folder = temporary();
+    let served = Served::swarm("square", &[], folder.path());
+    let seen = tour(&served.address, &json!({ "name": "follower", "follower": 12 }));
+    assert_in_windows(&seen);
+    let words = ["`robot_13` does not lead: drag a leader", "Click a robot first."];
+    assert_eq!(seen["follower"], json!([words[0], 0, words[1], "", ""]));
+    assert_eq!(seen["chosen"], json!([["robot_13", "dead"], ["robot_1", ""]]));
+    assert_eq!(seen["target"], true);
+    let offered = seen["offered"].as_array().expect("listed");
+    assert!(offered.contains(&json!("speed")) && offered.contains(&json!("acceleration")), "{offered:?}");
+    assert!(seen["hint"].as_str().is_some_and(|text| text.contains("click a robot")), "{}", seen["hint"]);
+}
+
 #[cfg(feature = "cli")]
 #[test]
 #[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]

@@ -70,3 +70,22 @@ fn a_recording_that_would_replace_a_file_is_refused_before_the_session() {
     assert_eq!(code.code(), Some(2));
     assert_eq!(std::fs::read(folder.path().join("live.mcap")).expect("there"), b"mine");
 }
+
+#[test]
+fn a_session_that_was_never_set_going_is_no_recording() {
+    for (name, words) in [("square", "no period was flown"), ("tension", "no step was taken")] {
+        let folder = temporary();
+        let mut program = start(&["live", name, "--record", "live.mcap"], folder.path());
+        let (host, token) = address(folder.path());
+        let mut viewer = within(PATIENCE, "a viewer is let in", || Viewer::enter(&host, &token));
+        viewer.ask(&json!({ "do": "step" }));
+        viewer.status("it goes on", |status| status["clock"].as_f64() > Some(0.0));
+        viewer.ask(&json!({ "do": "reset" }));
+        viewer.status("it begins anew", |status| status["clock"] == 0.0);
+        assert_eq!(program.terminate(), Some(0));
+        let files: Vec<_> = std::fs::read_dir(folder.path()).expect("a folder").flatten().collect();
+        assert_eq!(files.iter().map(|file| file.file_name()).collect::<Vec<_>>(), ["printed"]);
+        let printed = std::fs::read_to_string(folder.path().join("printed")).expect("printed");
+        assert!(printed.contains(&format!("{words}: nothing is recorded")), "{printed}");
+    }
+}

@@ -112,7 +112,87 @@ fn a_broken_bound_is_named_with_its_robots() {
     fly(&mut swarm, 2);
     let (words, robots) = swarm.alarms();
     assert!(words[0].contains("clearance: declared 5 m, now") && words[0].contains("robot_"), "{words:?}");
-    assert!(robots.len() >= 2, "{robots:?}");
+    assert!(robots.len() > 3, "{robots:?}");
+    assert!(words[0].ends_with(&format!(" and {} more", robots.len() - 3)), "{words:?}");
+    assert_eq!(words[0].matches("robot_").count(), 3, "{words:?}");
+}
+
+/// A quantity of a robot as the page shows it.
+fn shown(swarm: &Live, name: &str, robot: usize) -> f32 {
+    let channel = swarm.channels().iter().position(|known| *known == name).expect("a channel");
+    swarm.frame(&[]).channels[channel].as_ref().expect("sent")[robot]
+}
+
+#[test]
+fn a_leader_dragged_while_robots_stand_still_has_its_target_at_once() {
+    let mut swarm = begun("square");
+    let leader = leader(&swarm);
+    let place = swarm.flight().fleet().places().get(leader);
+    let from = swarm.flight().control().formation().places.get(leader);
+    ask(&mut swarm, &format!(r#"{{"do":"grab","particle":{leader}}}"#));
+    ask(&mut swarm, r#"{"do":"drag","by":[0.5,-0.25]}"#);
+    for (name, expected) in
+        [("target_dx", place[0] + 0.5 - from[0]), ("target_dy", place[1] - 0.25 - from[1])]
+    {
+        assert!((f64::from(shown(&swarm, name, leader)) - expected).abs() < 1e-6, "{name}");
+    }
+    fly(&mut swarm, 3);
+    assert_replays(&swarm);
+}
+
+#[test]
+fn a_hand_that_moves_nothing_is_nothing_to_undo() {
+    let mut swarm = begun("square");
+    let leader = leader(&swarm);
+    ask(&mut swarm, &format!(r#"{{"do":"grab","particle":{leader}}}"#));
+    ask(&mut swarm, r#"{"do":"drag","by":[0.0,0.0]}"#);
+    assert!(swarm.perform(0, &Command::Drag { by: [1e9, 0.0] }).is_err());
+    ask(&mut swarm, r#"{"do":"release"}"#);
+    assert_eq!(swarm.undoable(), 0);
+    ask(&mut swarm, &format!(r#"{{"do":"grab","particle":{leader}}}"#));
+    ask(&mut swarm, r#"{"do":"drag","by":[0.5,0.0]}"#);
+    ask(&mut swarm, r#"{"do":"drag","by":[0.6,0.0]}"#);
+    assert_eq!(swarm.undoable(), 1);
+}
+
+#[test]
+fn speed_and_acceleration_are_those_of_the_robots() {
+    let mut swarm = begun("square");
+    let robot = leader(&swarm);
+    fly(&mut swarm, 1);
+    let [x, y] = swarm.flight().fleet().robots()[robot].velocity;
+    fly(&mut swarm, 1);
+    let [u, v] = swarm.flight().fleet().robots()[robot].velocity;
+    let period = swarm.flight().control().period();
+    assert!(u.hypot(v) > 0.0);
+    assert_eq!(shown(&swarm, "speed", robot), u.hypot(v) as f32);
+    assert_eq!(shown(&swarm, "acceleration", robot), ((u - x).hypot(v - y) / period) as f32);
+}
+
+#[cfg(feature = "cli")]
+#[test]
+fn a_drag_of_what_was_not_to_be_taken_is_refused_once() {
+    use super::pages::Viewer;
+    let folder = super::folders::temporary();
+    let served = super::served::Served::swarm("square", &[], folder.path());
+    let (host, token) = served.parts();
+    let mut viewer = Viewer::enter(&host, &token).expect("let in");
+    let follower = {
+        let swarm = begun("square");
+        let formation = swarm.flight().control().formation();
+        (0..formation.count()).find(|&m| !formation.leads(m)).expect("follows")
+    };
+    viewer.ask(&serde_json::json!({ "do": "grab", "particle": follower }));
+    for _ in 0..3 {
+        viewer.ask(&serde_json::json!({ "do": "drag", "by": [0.1, 0.0] }));
+    }
+    viewer.ask(&serde_json::json!({ "do": "release" }));
+    let (_, first) = viewer.done(serde_json::json!({ "do": "fault", "robot": 99, "what": null }));
+    assert!(first.contains("does not lead"), "{first}");
+    let (_, second) = viewer.done(serde_json::json!({ "do": "drag", "by": [0.1, 0.0] }));
+    assert!(second.contains("no such robot"), "{second}");
+    let (_, third) = viewer.done(serde_json::json!({ "do": "fault", "robot": 99, "what": null }));
+    assert!(third.contains("nothing is held"), "{third}");
 }
 
 #[test]

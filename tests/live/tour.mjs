@@ -4,8 +4,8 @@
 //
 // `drag` numbers the particle that is dragged, `cut` has the ends of a cut, `key` is a key to change, `fault` the robot that is
 // killed, `push` says where an obstacle is taken and how far it goes, `squeeze` that the slider is moved, `load` has the particle
-// whose edge is loaded, `design` says what a designer does, `node` the leader of a node that is dragged. FLOCKFORM_NODE_MODULES
-// is a folder with playwright-core and axe-core, FLOCKFORM_PICTURES one for screenshots.
+// whose edge is loaded, `design` says what a designer does, `node` the leader of a node that is dragged, `first` the particle and
+// `follower` the robot that are dragged in a session that stands still as it began. FLOCKFORM_NODE_MODULES is a folder with playwright-core and axe-core, FLOCKFORM_PICTURES one for screenshots.
 
 import { createRequire } from "node:module";
 import { mkdtempSync, readFileSync, rmSync } from "node:fs";
@@ -238,6 +238,9 @@ async function design(page) {
   await settled(page);
   await page.check("#design-leads");
   await page.locator(".canvas").scrollIntoViewIfNeeded();
+  // Beside the formation there is room for another robot once the view is zoomed out.
+  for (const _ of [1, 2]) await page.click("#zoom-out");
+  await page.waitForFunction(() => window.report.views[0].show.camera === window.report.state.camera);
   const click = async (what) => page.mouse.click(...(await onScreen(page, what)));
   const pull = async (from, to) => {
     await page.mouse.move(...(await onScreen(page, from)));
@@ -326,6 +329,126 @@ async function command(page) {
   });
 }
 
+// Whether the view is large, and all of it and the clock below it in the window, in windows of laptops.
+async function windows(page) {
+  seen.windows = [];
+  for (const [width, height] of [[1366, 657], [1280, 900], [390, 844]]) {
+    await page.setViewportSize({ width, height });
+    await page.waitForTimeout(300);
+    await shoot(page, `${asked.name}-${width}`);
+    seen.windows.push(
+      await page.evaluate(() => {
+        const [view, clock] = [".canvas", ".transport"].map((of) => document.querySelector(of).getBoundingClientRect());
+        const isWide = document.documentElement.scrollWidth > document.documentElement.clientWidth;
+        return { high: view.height, below: clock.bottom - window.innerHeight, isWide };
+      }),
+    );
+  }
+  await page.setViewportSize({ width: 1280, height: 1000 });
+  await page.waitForTimeout(300);
+}
+
+const said = (page) => page.textContent("#live-words");
+const status = (page) => page.evaluate(() => ({ ...window.report.live.session.status }));
+const statusIs = (page, holds, value) =>
+  page.waitForFunction(([key, v]) => window.report.live.session.status[key] === v, [holds, value], { polling: 20 });
+
+async function pull(page, particle, by) {
+  const [x, y] = await onScreen(page, particle);
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  await page.mouse.move(x + by[0], y + by[1], { steps: 6 });
+  return [x + by[0], y + by[1]];
+}
+
+// What a reader does first with a body, which stands still.
+async function first(page) {
+  await windows(page);
+  const shown = (to) =>
+    page.waitForFunction(([k, [x, y]]) => {
+      const [view] = window.report.views;
+      const box = view.box.getBoundingClientRect();
+      const [u, v] = view.at(k);
+      return Math.hypot(box.left + u - x, box.top + v - y) < 1.5;
+    }, [asked.first, to], { polling: 20 });
+  const before = await place(page, asked.first);
+  const to = await pull(page, asked.first, [40, -30]);
+  await shown(to);
+  await shoot(page, `${asked.name}-held`);
+  await page.mouse.up();
+  await statusIs(page, "undo", 1);
+  await shown(to);
+  seen.still = { before, after: await place(page, asked.first), clock: await clock(page) };
+  for (const step of [1, 2]) {
+    await page.click("#forth");
+    await statusIs(page, "clock", step);
+    await settled(page);
+  }
+  seen.still.stepped = await place(page, asked.first);
+  await page.keyboard.press("u");
+  await statusIs(page, "undo", 0);
+  await settled(page);
+  seen.still.undone = await place(page, asked.first);
+  // Words are those of the last act.
+  await page.fill("#live-key", "damping");
+  await page.press("#live-key", "Enter");
+  seen.words3 = [await said(page)];
+  await page.click("#forth");
+  await statusIs(page, "clock", 1);
+  seen.words3.push(await said(page));
+  const damping = page.locator('#live-numbers input[data-key="update.damping"]');
+  await damping.fill("");
+  await damping.blur();
+  seen.emptied = await damping.inputValue();
+  await damping.fill("0.8009999999999998");
+  await damping.blur();
+  await page.waitForFunction(() => window.report.live.session.status.sets.length > 0);
+  seen.counted = (await status(page)).sets;
+  await save(page);
+  await page.keyboard.press(" ");
+  await statusIs(page, "playing", true);
+  seen.savedOnce = (await said(page)) === "";
+  await page.locator("label", { hasText: "look" }).click();
+  await page.keyboard.press(" ");
+  await statusIs(page, "playing", false);
+}
+
+// And with a swarm: a follower does not lead.
+async function follower(page) {
+  await windows(page);
+  await pull(page, asked.follower, [50, 40]);
+  await page.waitForFunction(() => document.getElementById("live-words").textContent !== "");
+  await page.mouse.up();
+  await page.waitForTimeout(300);
+  seen.follower = [await said(page), (await status(page)).undo];
+  await page.selectOption("#live-fault", "dead");
+  seen.follower.push(await said(page), await page.inputValue("#live-fault"));
+  const click = async (robot) => page.mouse.click(...(await onScreen(page, robot)));
+  await click(asked.follower);
+  await page.selectOption("#live-fault", "dead");
+  await page.waitForFunction(() => window.report.live.session.status.faults.length > 0);
+  seen.follower.push(await said(page));
+  const chosen = () => page.$eval("#live-fault", (list) => [document.getElementById("live-chosen").textContent, list.value]);
+  await page.waitForTimeout(200);
+  seen.chosen = [await chosen()];
+  await click(0);
+  await page.waitForTimeout(200);
+  seen.chosen.push(await chosen());
+  const to = await pull(page, 0, [60, 30]);
+  await page.waitForFunction(() => window.report.live.session.status.undo === 2);
+  seen.target = await page.waitForFunction((at) => {
+    const { views: [view], bodies: [body] } = window.report;
+    const box = view.box.getBoundingClientRect();
+    const [tx, ty] = ["target_dx", "target_dy"].map((name) => body.frames.values.get(name)[0]);
+    const [x, y] = view.place([body.X[0] + tx, body.Y[0] + ty]);
+    return Math.hypot(box.left + x - at[0], box.top + y - at[1]) < 2;
+  }, to).then(() => true);
+  await shoot(page, `${asked.name}-held`);
+  await page.mouse.up();
+  seen.offered = await page.$$eval("#quantity option", (options) => options.map((option) => option.value));
+  seen.hint = await page.textContent(".keys");
+}
+
 async function everything(page, other) {
   seen.offered = await boxes(page);
   await tools(page);
@@ -365,6 +488,8 @@ try {
   await page.bringToFront();
   if (asked.node !== undefined) await command(page);
   else if (asked.design) await design(page);
+  else if (asked.first !== undefined) await first(page);
+  else if (asked.follower !== undefined) await follower(page);
   else await everything(page, other);
   await page.addScriptTag({ content: axe }).catch(() => {});
   seen.words = await page.textContent("#loading");

@@ -155,16 +155,17 @@ impl FlightRecorder {
         self.finished(stage)
     }
 
-    /// Robots at these places \[m\], in a single frame; displacements are from their nominal places.
+    /// Robots at these places \[m\], in a single frame, of motions that are known or not; displacements are from their
+    /// nominal places.
     #[cfg(feature = "live")]
-    pub(crate) fn still(swarm: &Swarm, control: &Control, places: &Vectors) -> View {
+    pub(crate) fn still(swarm: &Swarm, control: &Control, places: &Vectors, flies: bool) -> View {
         let formation = control.formation();
         let mut recorder = Self::since(control, places, formation.places.clone());
-        let stage = recorder.begun(swarm, formation.names.clone(), false);
+        let stage = recorder.begun(swarm, formation.names.clone(), flies);
         recorder.finished(stage)
     }
 
-    /// The view without its frames, of robots that fly or that stand still.
+    /// The view without its frames, of robots whose motion is known or whose places alone are.
     fn begun(&self, swarm: &Swarm, names: Vec<String>, flies: bool) -> View {
         let is_known = |name: &str| match name {
             "away" => self.has_places,

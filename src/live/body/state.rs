@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::continuum::plan::Plan;
 use crate::continuum::run::Bounds;
 use crate::engine::Engine;
-use crate::engine::forces::held;
+use crate::engine::forces::{Held, held};
 use crate::engine::setup::{RoleChange, Setup};
 use crate::flock::motion::{Interpolation, Keyframe, Motion};
 use crate::flock::role::Role;
@@ -35,22 +35,42 @@ pub(super) struct State {
     hands: Vec<RawRoles>,
     pub(super) actions: Vec<RawAction>,
     /// Things that viewers hold.
-    pub(super) grabs: BTreeMap<Viewer, Grab>,
+    grabs: BTreeMap<Viewer, Grab>,
+    /// Hands that have let go, whose last step is still to come or has just been taken.
+    let_go: Vec<LetGo>,
 }
 
 /// Particles in a viewer's hand.
 #[derive(Clone)]
-pub(super) struct Grab {
+struct Grab {
+    particles: Vec<usize>,
+    /// Whether the particles follow again when they are let go.
+    follows: bool,
+    /// Where the hand has them, from where it took them \[length\].
+    by: [f64; 2],
+    /// Absent until it has moved them: a hand that moves nothing does nothing.
+    lead: Option<Lead>,
+}
+
+/// A hand's part in the engine, and in the scene that replays what was done.
+#[derive(Clone)]
+struct Lead {
     /// Number among the engine's role changes, and among `hands`.
     change: usize,
     hand: usize,
     frames: Vec<Keyframe>,
     /// Step before the first one led.
     since: usize,
-    /// Whether the particles follow again when they are let go.
+    /// How far they were to go by an earlier hand when this one took them \[length\].
+    from: [f64; 2],
+}
+
+#[derive(Clone)]
+struct LetGo {
+    change: usize,
+    /// Last step that it leads.
+    until: usize,
     follows: bool,
-    /// Where the hand has them \[length\].
-    pub(super) by: [f64; 2],
 }
 
 impl history::State for State {
@@ -68,8 +88,8 @@ impl history::State for State {
         let bounds = Bounds::of(&plan);
         let setup = Arc::new(plan.setup);
         let engine = Engine::new(Setup::clone(&setup));
-        let (hands, actions, grabs) = (Vec::new(), Vec::new(), BTreeMap::new());
-        Ok(Self { scene: Arc::new(scene), setup, bounds, engine, hands, actions, grabs })
+        let (hands, actions, grabs, let_go) = (Vec::new(), Vec::new(), BTreeMap::new(), Vec::new());
+        Ok(Self { scene: Arc::new(scene), setup, bounds, engine, hands, actions, grabs, let_go })
     }
 
     fn let_go_all(&mut self) {
@@ -92,18 +112,60 @@ impl State {
         self.actions.iter().any(|action| matches!(action.what, RawActionKind::Cut { .. }))
     }
 
-    /// The particles that one is held with, or itself.
-    pub(super) fn held_with(&self, particle: usize) -> Vec<usize> {
+    /// The particles that one is held with and goes on with, or itself.
+    fn held_with(&self, particle: usize) -> Vec<usize> {
         let groups = held(&self.engine).into_iter();
         let group = groups
             .filter(|_| self.engine.roles()[particle] != Role::Follower)
             .find(|group| group.iter().any(|one| one.particle == particle));
-        group.map_or_else(|| vec![particle], |group| group.iter().map(|one| one.particle).collect())
+        let ahead = self.ahead();
+        let goes_along = |i: &usize| ahead.get(i) == ahead.get(&particle);
+        let together = |group: Vec<Held>| group.iter().map(|one| one.particle).filter(goes_along).collect();
+        group.map_or_else(|| vec![particle], together)
     }
 
-    /// Leads particles by a viewer's hand from the next step on.
-    pub(super) fn take(&mut self, viewer: Viewer, particles: Vec<usize>, follows: bool) {
+    /// Takes particles in a viewer's hand: one, or all that are held as it is.
+    pub(super) fn grab(&mut self, viewer: Viewer, particle: usize, alone: bool) -> Result<(), Refused> {
+        let particles = if alone { vec![particle] } else { self.held_with(particle) };
+        self.require_room(particles.len())?;
+        // One that was let go follows at the step after the last one led.
+        let is_freed =
+            |one: &LetGo| one.follows && self.engine.changes()[one.change].particles.contains(&particle);
+        let follows = self.engine.roles()[particle] == Role::Follower || self.let_go.iter().any(is_freed);
+        self.grabs.insert(viewer, Grab { particles, follows, by: [0.0; 2], lead: None });
+        Ok(())
+    }
+
+    /// Moves what a viewer holds, from where it was taken \[length\].
+    pub(super) fn drag(&mut self, viewer: Viewer, by: [f64; 2]) -> Result<(), Refused> {
+        self.grabs.get_mut(&viewer).ok_or("nothing is held")?.by = by;
+        self.require_room(0)
+    }
+
+    /// Whether a hand has moved something for the first time.
+    pub(super) fn begins_to_lead(&self) -> bool {
+        self.grabs.values().any(Grab::begins_to_lead)
+    }
+
+    /// Leads what hands have moved to where they have it, from the next step on.
+    pub(super) fn lead(&mut self) {
+        let step = self.engine.step();
+        self.let_go.retain(|one| one.until >= step);
+        for (viewer, mut grab) in std::mem::take(&mut self.grabs) {
+            if grab.begins_to_lead() {
+                grab.lead = Some(self.begin(&grab.particles));
+            }
+            if let Some(lead) = &mut grab.lead {
+                lead.hold(&mut self.engine, grab.by);
+            }
+            self.grabs.insert(viewer, grab);
+        }
+    }
+
+    /// Leads particles by a hand from the next step on.
+    fn begin(&mut self, particles: &[usize]) -> Lead {
         let from = self.next_from();
+        let taken_at = self.ahead().get(&particles[0]).copied().unwrap_or_default();
         let ids = particles.iter().map(|&i| self.engine.body().id(i)).collect();
         let frames = vec![Keyframe { step: 1.0, displacement: [0.0; 2] }];
         self.hands.push(RawRoles {
@@ -114,12 +176,10 @@ impl State {
             when: None,
             motion: None,
         });
-        let motion = Some(motion(frames.clone()));
+        let (motion, particles) = (Some(motion(frames.clone())), particles.to_vec());
         let change = RoleChange { particles, role: Role::Leader, axis: None, from, when: None, motion };
         let change = self.engine.add_role_change(change);
-        let hand = self.hands.len() - 1;
-        let grab = Grab { change, hand, frames, since: from - 1, follows, by: [0.0; 2] };
-        self.grabs.insert(viewer, grab);
+        Lead { change, hand: self.hands.len() - 1, frames, since: from - 1, from: taken_at }
     }
 
     /// First step at which a role can be taken: those of the first step hold from the start.
@@ -127,15 +187,22 @@ impl State {
         (self.engine.step() + 1).max(2)
     }
 
+    /// Lets go of what a viewer holds, where [`State::lead`] has it.
     pub(super) fn let_go(&mut self, viewer: Viewer) {
-        let Some(grab) = self.grabs.remove(&viewer) else { return };
-        let hand = &mut self.hands[grab.hand];
-        hand.motion = Some(raw_motion(&grab.frames));
-        if !grab.follows {
+        let Some(Grab { follows, lead: Some(lead), .. }) = self.grabs.remove(&viewer) else { return };
+        let hand = &mut self.hands[lead.hand];
+        hand.motion = Some(raw_motion(&lead.frames));
+        // A place that no step has reached yet is the next step's.
+        let from = self.next_from().max(lead.last_step() + 1);
+        // Of several hands before a step the last has them.
+        let changes = self.engine.changes();
+        let is_other = |one: &LetGo| changes[one.change].particles != changes[lead.change].particles;
+        self.let_go.retain(is_other);
+        self.let_go.push(LetGo { change: lead.change, until: from - 1, follows });
+        if !follows {
             return;
         }
-        let from = self.next_from();
-        let region = self.hands[grab.hand].region.clone();
+        let region = self.hands[lead.hand].region.clone();
         self.hands.push(RawRoles {
             region,
             role: RawRole::Follower,
@@ -144,7 +211,7 @@ impl State {
             when: None,
             motion: None,
         });
-        let particles = self.engine.changes()[grab.change].particles.clone();
+        let particles = self.engine.changes()[lead.change].particles.clone();
         let role = Role::Follower;
         self.engine.add_role_change(RoleChange {
             particles,
@@ -154,6 +221,38 @@ impl State {
             when: None,
             motion: None,
         });
+    }
+
+    /// Particles that hands have taken on since the last step, and how far they are to go \[length\].
+    pub(super) fn ahead(&self) -> BTreeMap<usize, [f64; 2]> {
+        let mut ahead = BTreeMap::new();
+        let changes = self.engine.changes();
+        let (now, end) = (self.engine.step() as f64, f64::INFINITY);
+        // A hand's jumps lead all of its particles alike, wherever they began.
+        let led = |change: &RoleChange, step: f64| {
+            change.motion.as_ref().map_or([0.0; 2], |motion| motion.displacement(step, 0, [0.0; 2]))
+        };
+        let to_go = |change: &RoleChange, to: [f64; 2]| {
+            let here = led(change, now + 1.0 - change.from as f64);
+            [0, 1].map(|k| to[k] - here[k])
+        };
+        for one in &self.let_go {
+            let change = &changes[one.change];
+            let by = to_go(change, led(change, end));
+            ahead.extend(change.particles.iter().map(|&i| (i, by)));
+        }
+        for grab in self.grabs.values() {
+            let by = match &grab.lead {
+                Some(lead) => to_go(&changes[lead.change], lead.place(grab.by)),
+                None => {
+                    let before = ahead.get(&grab.particles[0]).copied().unwrap_or_default();
+                    [0, 1].map(|k| before[k] + grab.by[k])
+                }
+            };
+            ahead.extend(grab.particles.iter().map(|&i| (i, by)));
+        }
+        ahead.retain(|_, by| *by != [0.0; 2]);
+        ahead
     }
 
     /// Refuses more than a file should hold, were so many particles taken as well.
@@ -171,7 +270,8 @@ impl State {
             Some(RawMotion::Keyframes { frames, .. }) => frames.len(),
             _ => 0,
         };
-        let moved: usize = self.grabs.values().map(|grab| grab.frames.len()).sum();
+        let leads = self.grabs.values().filter_map(|grab| grab.lead.as_ref());
+        let moved: usize = leads.map(|lead| lead.frames.len()).sum();
         moved + self.hands.iter().map(kept).sum::<usize>()
     }
 
@@ -224,18 +324,35 @@ impl State {
 }
 
 impl Grab {
+    fn begins_to_lead(&self) -> bool {
+        self.lead.is_none() && self.by != [0.0; 2]
+    }
+}
+
+impl Lead {
     /// Has its particles where the hand is from the next step on.
-    pub(super) fn hold(&mut self, engine: &mut Engine) {
-        if self.frames.last().is_none_or(|last| last.displacement == self.by) {
+    fn hold(&mut self, engine: &mut Engine, by: [f64; 2]) {
+        let displacement = self.place(by);
+        if self.frames.last().is_none_or(|last| last.displacement == displacement) {
             return;
         }
         let step = (engine.step() + 1).saturating_sub(self.since).max(1);
-        let frame = Keyframe { step: step as f64, displacement: self.by };
+        let frame = Keyframe { step: step as f64, displacement };
         match self.frames.last_mut() {
-            Some(last) if last.step >= frame.step => last.displacement = frame.displacement,
+            Some(last) if last.step >= frame.step => last.displacement = displacement,
             _ => self.frames.push(frame),
         }
         engine.steer(self.change, motion(self.frames.clone()));
+    }
+
+    /// Where a hand that has moved so far has its particles, from where they began \[length\].
+    fn place(&self, by: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|k| self.from[k] + by[k])
+    }
+
+    /// The first step that has its particles where the hand was last.
+    fn last_step(&self) -> usize {
+        self.since + self.frames.last().map_or(0, |frame| frame.step as usize)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Declared bounds that are broken now, and by which robots.
 
 use super::Flight;
-use super::measure::{Record, closest, farthest};
+use super::measure::{Record, farthest};
 use super::moment::Extreme;
 use crate::flock::vectors::Vectors;
 use crate::scene::swarm::Swarm;
@@ -16,7 +16,7 @@ pub struct Alarm {
     pub declared: f64,
     /// As it is \[m\].
     pub found: f64,
-    /// Robots that break it, by number.
+    /// Robots that break it, by number: the one that is farthest off, or all that are too close, the closest first.
     pub robots: Vec<usize>,
 }
 
@@ -26,7 +26,7 @@ impl Alarm {
         let mut record = Record::new(swarm, flight);
         let sample = record.take(flight, before);
         let [affine, _, continuum] = record.farthest.last().copied().unwrap_or_default();
-        broken(swarm, affine, continuum, sample.clearance, record.closest)
+        broken(swarm, affine, continuum, sample.clearance, &record.clearances)
     }
 
     /// The bounds that robots break by their last poses. A robot without a usable pose breaks none, and no continuum
@@ -44,8 +44,7 @@ impl Alarm {
             around.iter().enumerate().map(|(m, &gap)| if is_usable(m) { gap } else { f64::INFINITY });
         let around: Vec<f64> = of_usable.collect();
         let clearance = around.iter().copied().fold(f64::INFINITY, f64::min);
-        let by = closest(&around, clearance, &present, time);
-        broken(swarm, affine, None, clearance, Some(by))
+        broken(swarm, affine, None, clearance, &around)
     }
 }
 
@@ -54,18 +53,19 @@ fn broken(
     affine: Option<Extreme>,
     continuum: Option<Extreme>,
     clearance: f64,
-    closest: Option<Extreme>,
+    around: &[f64],
 ) -> Vec<Alarm> {
     let bounds = &swarm.raw.flight.bounds;
     let above = |bound, declared: Option<f64>, by: Option<Extreme>| {
         let (declared, found) = (declared?, by?.value);
-        (found > declared).then(|| Alarm { bound, declared, found, robots: robots(by) })
+        let robots = by.iter().map(|by| by.member).collect();
+        (found > declared).then_some(Alarm { bound, declared, found, robots })
     };
     let too_close = bounds.clearance.filter(|&declared| clearance < declared).map(|declared| Alarm {
         bound: "clearance",
         declared,
         found: clearance,
-        robots: robots(closest),
+        robots: below(around, declared),
     });
     let alarms = [
         above("affine_error", bounds.affine_error, affine),
@@ -75,6 +75,9 @@ fn broken(
     alarms.into_iter().flatten().collect()
 }
 
-fn robots(by: Option<Extreme>) -> Vec<usize> {
-    by.map_or_else(Vec::new, |by| [Some(by.member), by.other].into_iter().flatten().collect())
+/// Robots around which there is less room, those with the least first.
+fn below(around: &[f64], declared: f64) -> Vec<usize> {
+    let mut robots: Vec<usize> = (0..around.len()).filter(|&m| around[m] < declared).collect();
+    robots.sort_by(|&a, &b| around[a].total_cmp(&around[b]));
+    robots
 }

@@ -139,7 +139,7 @@ pub(super) fn farthest(
 }
 
 /// The robots that came that close.
-pub(super) fn closest(around: &[f64], value: f64, present: &Vectors, time: f64) -> Extreme {
+fn closest(around: &[f64], value: f64, present: &Vectors, time: f64) -> Extreme {
     let those = |&m: &usize| around[m] == value;
     let member = (0..around.len()).find(those).unwrap_or(0);
     let here = present.get(member);

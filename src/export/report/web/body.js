@@ -54,7 +54,15 @@ export class Body {
 
   async openCells(named) {
     const { corners } = this.animation;
-    this.cells = corners ? await integers(named("cells"), corners) : new Uint32Array(0);
+    const cells = corners ? await integers(named("cells"), corners) : new Uint32Array(0);
+    // The frame is around the body, and no part of its surface: it has no stress of its own.
+    const frame = this.animation.role_names.indexOf("frame");
+    const isBody = (_, n) => {
+      const first = n - (n % corners);
+      for (let k = first; k < first + corners; k++) if (this.firstRoles[cells[k]] === frame) return false;
+      return true;
+    };
+    this.cells = cells.filter(isBody);
     this.orderCells();
   }
 

@@ -17,7 +17,8 @@ export function fit() {
   const view = shown.views[0];
   // A lying body needs no high window.
   const wanted = (1.15 * view.box.clientWidth * (high[1] - low[1])) / (high[0] - low[0]) + 60;
-  const height = Math.round(Math.min(Math.max(wanted, 260), Math.min(0.66 * window.innerHeight, 640)));
+  const room = shown.roomFor ? Math.max(shown.roomFor(view), 260) : Math.min(0.66 * window.innerHeight, 640);
+  const height = Math.round(Math.min(Math.max(wanted, 260), room));
   if (Number.isFinite(height)) shown.views.forEach(({ box }) => (box.style.height = `${height}px`));
   view.resize();
   const scales = [view.width / (high[0] - low[0]), view.height / (high[1] - low[1])];

@@ -3,7 +3,7 @@
 import { move, refit, turn, zoom } from "./camera.js";
 import { keep, showTip, tip } from "./numbers.js";
 import { draw, drawNow } from "./page.js";
-import { saveDrawing, savePicture } from "./picture.js";
+import { saveDrawing, savePicture, sharply } from "./picture.js";
 import { takePalette } from "./scale.js";
 import { bodies, element, shown, state } from "./shown.js";
 
@@ -88,10 +88,16 @@ export function listenToKeys() {
       "-": () => zoom(0.8),
       0: refit,
     };
-    const act = event.shiftKey && shifts[event.key] ? () => move(...shifts[event.key]) : keys[event.key];
+    const act = event.shiftKey && shifts[event.key] ? () => move(...shifts[event.key]) : (keys[event.key] ?? shown.keys?.[event.key]);
     if (!act || (isRange && event.target.type === "checkbox" && event.key === " ")) return;
     event.preventDefault();
     act();
+  });
+  // A button that the mouse has pressed leaves the keys to the page; one that was reached by keys keeps them.
+  document.addEventListener("click", ({ detail }) => {
+    const leave = ({ activeElement }) => activeElement?.matches("button, input[type=radio], input[type=checkbox]") && activeElement.blur();
+    // A label hands its click on first.
+    if (detail > 0) setTimeout(leave, 0, document);
   });
 }
 
@@ -179,6 +185,7 @@ export function nameControls() {
   element("points-name").textContent = `${animation.noun}s`;
   element("bonds-name").textContent = isSwarm ? "links" : "bonds";
   element("find-name").textContent = animation.noun[0].toUpperCase() + animation.noun.slice(1);
+  element("noun").textContent = animation.noun;
   element("magnify-label").hidden = isSwarm;
   element("find-names").replaceChildren(...animation.names.map((name) => Object.assign(document.createElement("option"), { value: name })));
 }
@@ -217,8 +224,7 @@ export function listenToTheme() {
   window.addEventListener("beforeprint", () => {
     before = root.dataset.theme;
     take(false);
-    drawNow();
-    shown.views.forEach((view) => view.fix());
+    sharply(() => shown.views.forEach((view) => view.fix()));
     shown.isPrinting = true;
   });
   window.addEventListener("afterprint", () => {

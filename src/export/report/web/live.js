@@ -1,6 +1,6 @@
 // A page that a session feeds: the socket, the clock, the controls of the session.
 
-import { follow } from "./camera.js";
+import { follow, refit } from "./camera.js";
 import { words } from "./colour.js";
 import { breakBonds, kindOf, LiveFrames } from "./live_frames.js";
 import { isDesigning, keepHands, listenToDesign, showDesign, takeDesign, takeUpHands } from "./live_design.js";
@@ -20,8 +20,14 @@ const HIDDEN_EVERY = 300;
 const session = { socket: null, status: { alarmed: [], faults: [] }, frame: null, isAsked: false, rangeAt: 0, alarms: "", sets: null };
 const measured = { drawn: 0, since: 0, rate: 0, transfer: 0, drawing: 0 };
 
+// Requests that go on with an act, or are none: what was said before still holds.
+const NO_ACTS = new Set(["ask", "drawn", "drag", "squeeze", "release"]);
+
 function ask(command) {
-  if (session.socket?.readyState === WebSocket.OPEN) session.socket.send(JSON.stringify(command));
+  if (session.socket?.readyState !== WebSocket.OPEN) return;
+  // Words are those of the last act: the next one clears or replaces them.
+  if (!NO_ACTS.has(command.do)) say("");
+  session.socket.send(JSON.stringify(command));
 }
 
 // The clock of a session, in the place of a film's: it knows the present alone.
@@ -108,6 +114,7 @@ function loadAnew() {
 function takeStatus(status) {
   // Another body: another page.
   if (status.layout !== data.live.layout) return loadAnew();
+  const { stopped } = session.status;
   session.status = status;
   shown.player.tempo = status.speed;
   if (shown.player.playing !== status.playing) {
@@ -117,6 +124,7 @@ function takeStatus(status) {
   element("speed").value = String(status.speed);
   element("live-undo").disabled = status.undo === 0;
   if (status.stopped) say(status.stopped, true);
+  else if (stopped && element("live-words").textContent === stopped) say("");
   if (element("command").textContent !== status.command) element("command").textContent = status.command;
   ["cut", "load"].forEach((tool) => offer(tool, status.tools.includes(tool)));
   if (status.node) takeNode(status.node);
@@ -145,7 +153,9 @@ function takeSets(sets) {
   for (const [key, value] of values) {
     const isNumber = value !== "" && Number.isFinite(Number(value));
     const input = numberOf(key) ?? (isNumber ? addNumber(key, value) : null);
-    if (input && input !== document.activeElement && input.value !== value) input.value = value;
+    if (!input) continue;
+    input.dataset.now = tidy(value);
+    if (input !== document.activeElement && input.value !== input.dataset.now) input.value = input.dataset.now;
   }
   // What was undone and is no number of the file is none to change.
   for (const input of document.querySelectorAll("#live-numbers input")) if (!values.has(input.dataset.key)) input.parentElement.remove();
@@ -155,12 +165,22 @@ function numberOf(key) {
   return [...document.querySelectorAll("#live-numbers input")].find((input) => input.dataset.key === key);
 }
 
+// Without the last digits of a binary number: 0.8009999999999998, which a box counts up to, is 0.801.
+function tidy(value) {
+  return value === "" ? "" : String(Number(Number(value).toPrecision(12)));
+}
+
 // A box for a number; an empty one stands for none.
 function addNumber(key, value) {
   const label = document.createElement("label");
-  const input = Object.assign(document.createElement("input"), { type: "number", step: "any", value: value ?? "", placeholder: "none" });
-  input.dataset.key = key;
-  input.addEventListener("change", () => input.value !== "" && set(key, input.value));
+  const now = tidy(String(value ?? ""));
+  const input = Object.assign(document.createElement("input"), { type: "number", step: "any", value: now, placeholder: "none" });
+  Object.assign(input.dataset, { key, now });
+  input.addEventListener("change", () => {
+    // What was emptied shows again what holds.
+    if (input.value === "") input.value = input.dataset.now;
+    else set(key, (input.value = tidy(input.value)));
+  });
   label.append(`${key} `, input);
   element("live-numbers").append(label);
   return input;
@@ -300,7 +320,6 @@ function askForQuantity() {
 }
 
 function set(key, value) {
-  say("");
   ask({ do: "set", key: key.trim(), value: String(value).trim() });
 }
 
@@ -345,9 +364,25 @@ function listenToSession() {
   listenToSqueeze(element("live-squeeze"));
   element("live-fault").addEventListener("change", () => {
     const robot = shown.views[0].kept;
-    if (robot < 0) return say("Click a robot first.", true);
-    ask({ do: "fault", robot, what: element("live-fault").value || null });
+    const what = element("live-fault").value || null;
+    if (robot >= 0) return ask({ do: "fault", robot, what });
+    say("Click a robot first.", true);
+    showFault(shown.views[0]);
   });
+}
+
+// The list has the fault of the robot that was clicked.
+function showFault({ body, kept }) {
+  const fault = session.status.faults.find(([robot]) => robot === kept)?.[1] ?? "";
+  const [list, name] = [element("live-fault"), kept < 0 ? "Robot" : body.name(kept)];
+  if (list.value !== fault) list.value = fault;
+  if (element("live-chosen").textContent !== name) element("live-chosen").textContent = name;
+}
+
+// How high a view may be so that the legend and the clock below it are in the window.
+function roomFor({ box }) {
+  const [view, clock] = [box, element("now").closest(".transport")].map((one) => one.getBoundingClientRect());
+  return window.innerHeight - (view.top + window.scrollY) - (clock.bottom - view.bottom) - 10;
 }
 
 function startLive() {
@@ -361,11 +396,11 @@ function startLive() {
   if (data.live.swarm)
     shown.over = (view) => {
       showDesign();
+      showFault(view);
       drawTargets(view);
       drawAlarms(view, session.status);
       if (session.pull) drawDashes(view, ...session.pull);
     };
-  document.body.classList.add("is-live");
   element("layer-ways").closest("label").hidden = true;
   element("layer-ways").checked = state.layers.ways = false;
   element("layer-cracks").closest("label").hidden = true;
@@ -383,4 +418,11 @@ function startLive() {
   connect();
 }
 
-if (data.live) started.then(startLive);
+if (data.live) {
+  // Before the first view is fitted.
+  document.body.classList.add("is-live");
+  shown.roomFor = roomFor;
+  shown.keys = { u: () => !data.live.node && ask({ do: "undo" }) };
+  window.addEventListener("resize", () => state.isFitted && shown.player?.ready && refit());
+  started.then(startLive);
+}

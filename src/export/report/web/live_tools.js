@@ -73,8 +73,8 @@ function pull(view, at, side, ask) {
     view.drawOver();
     const place = placeAt(view, to);
     if (Math.hypot(to[0] - at[0], to[1] - at[1]) < 4) return false;
-    shown.say(`The ${side} side is loaded: drag it again for another load, undo takes it away.`);
     ask({ do: "load", side, by: [0, 1].map((k) => (place[k] - from[k]) / (state.factor || 1)) });
+    shown.say(`The ${side} side is loaded: drag it again for another load, undo takes it away.`);
     return true;
   };
   return { move, end };

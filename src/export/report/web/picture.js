@@ -5,7 +5,8 @@ import { themeText } from "./colour.js";
 import { traceMark } from "./marks.js";
 import { CRACK_DASH } from "./view.js";
 import { SvgPen } from "./svg_pen.js";
-import { crackKeys, ramp, roleKeys, scaleOf } from "./scale.js";
+import { draw, drawNow } from "./page.js";
+import { crackKeys, quantities, ramp, roleKeys, scaleOf } from "./scale.js";
 import { element, shown, state } from "./shown.js";
 
 // In CSS pixels.
@@ -14,10 +15,32 @@ const GAP = 12;
 const TITLE = 22;
 const LINE = 18;
 const BAR = { width: 300, height: 12 };
+// Pixels to a CSS pixel, at least: as many as print takes.
+export const PRINT_SHARPNESS = 2;
 // More dots and lines than this would make a file too large to open: they go in as the picture they are.
 const MOST_VECTORS = 20000;
 
 export function savePicture() {
+  sharply(writePicture);
+}
+
+export function saveDrawing() {
+  sharply(writeDrawing);
+}
+
+// Does something while the views are drawn as sharply as print takes them.
+export function sharply(act) {
+  shown.sharpness = Math.max(PRINT_SHARPNESS, window.devicePixelRatio || 1);
+  drawNow();
+  try {
+    act();
+  } finally {
+    shown.sharpness = null;
+  }
+  draw();
+}
+
+function writePicture() {
   const sheet = sheetOf();
   const canvas = document.createElement("canvas");
   const { ratio } = shown.views[0];
@@ -28,7 +51,7 @@ export function savePicture() {
   save(canvas.toDataURL("image/png"), "png");
 }
 
-export function saveDrawing() {
+function writeDrawing() {
   const sheet = sheetOf();
   const pen = new SvgPen(sheet.width, sheet.height, document.title);
   sheet.paint(pen);
@@ -37,7 +60,8 @@ export function saveDrawing() {
 
 function save(href, ending) {
   const link = document.createElement("a");
-  Object.assign(link, { href, download: `${document.title} ${element("now").textContent}.${ending}` });
+  const { label } = quantities().find(({ key }) => key === state.quantity);
+  Object.assign(link, { href, download: `${document.title}, ${label}, ${element("now").textContent}.${ending}` });
   link.click();
   if (href.startsWith("blob:")) setTimeout(() => URL.revokeObjectURL(href), 1000);
 }

@@ -19,8 +19,9 @@ export const state = {
   ranges: new Map(),
 };
 
-// A live page adds what takes the pointer (`tool`), what is drawn on top (`over`) and where words are said (`say`).
-export const shown = { views: [], charts: [], player: null, isPrinting: false };
+// A live page adds what takes the pointer (`tool`), what is drawn on top (`over`), where words are said (`say`), keys of its own
+// (`keys`) and how high a view may be (`roomFor`). `sharpness` is in pixels to a CSS pixel, where it is not the screen's.
+export const shown = { views: [], charts: [], player: null, isPrinting: false, sharpness: null };
 
 // For the browser's console: `report.bodies[0].numbers(66)`.
 window.report = {

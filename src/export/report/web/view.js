@@ -11,6 +11,9 @@ const MOST_WAYS = 400;
 // Largest distance of the pointer from a particle that it names, in pixels.
 const REACH = 14;
 
+// Smallest radius of a robot where there are few, in pixels: seen in a wide formation, and hit.
+const LEAST_ROBOT = 3.5;
+
 // Of broken bonds, in pixels.
 export const CRACK_DASH = [3, 2];
 
@@ -83,11 +86,14 @@ export class View {
   }
 
   resize() {
-    const ratio = window.devicePixelRatio || 1;
+    const ratio = shown.sharpness ?? (window.devicePixelRatio || 1);
     const [width, height] = [this.box.clientWidth, this.box.clientHeight];
     for (const canvas of [this.under, this.middle, this.over]) {
       const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
-      if (canvas.width !== w || canvas.height !== h) Object.assign(canvas, { width: w, height: h });
+      if (canvas.width === w && canvas.height === h) continue;
+      Object.assign(canvas, { width: w, height: h });
+      // It is empty now, also where it soon is as large as before.
+      [this.below, this.isClear] = ["", false];
     }
     Object.assign(this, { ratio, width, height });
   }
@@ -118,14 +124,16 @@ export class View {
     }
     show.shade(body, shades);
     const scale = show.camera.scale * ratio;
-    if (animation.radii.length) for (let i = 0; i < body.count; i++) radii[i] = Math.max(animation.radii[i] * scale, 1.5 * ratio);
+    const least = (body.count <= MOST_WAYS ? LEAST_ROBOT : 1.5) * ratio;
+    if (animation.radii.length) for (let i = 0; i < body.count; i++) radii[i] = Math.max(animation.radii[i] * scale, least);
     else radii.fill(Math.min(Math.max((show.layers.surface ? 0.13 : 0.27) * animation.spacing * scale, 0.7), 9 * ratio));
     if (show.layers.points) body.roles().forEach((role, i) => (this.marks[i] = this.markOfRole[role]));
     const bondsFrom = 2 * body.brokenBonds();
     const trianglesFrom = 3 * body.trianglesPerCell * body.tornCells();
     this.painter.draw({
       places, values: shades, radii, marks: this.marks,
-      palette: show.palette, isFlat: show.isFlat, layers: show.layers, spacing: animation.spacing * scale,
+      palette: show.palette, isFlat: show.isFlat, layers: show.layers,
+      spacing: animation.radii.length ? Math.max(animation.spacing * scale, 2 * least) : animation.spacing * scale,
       camera: { x: show.camera.x - origin[0], y: show.camera.y - origin[1], scale },
       bondsFrom, bondCount: body.bonds.length - bondsFrom,
       trianglesFrom, triangleCount: body.triangles.length - trianglesFrom,
@@ -212,7 +220,8 @@ export class View {
   drawGrid(pen) {
     const { camera } = this.show;
     const [halfWidth, halfHeight] = [this.width / 2 / camera.scale, this.height / 2 / camera.scale];
-    const across = ticks(camera.x - halfWidth, camera.x + halfWidth, this.width / 110);
+    // On a phone too there are two of them, whose distance is that of the others.
+    const across = ticks(camera.x - halfWidth, camera.x + halfWidth, Math.max(this.width / 110, 4));
     const step = across.length > 1 ? across[1] - across[0] : 1;
     const up = [];
     for (let k = Math.ceil((camera.y - halfHeight) / step); k * step <= camera.y + halfHeight; k++) up.push(k * step);
