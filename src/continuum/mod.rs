@@ -16,6 +16,7 @@ pub mod layout;
 pub mod looks;
 pub mod mechanics;
 pub mod memory;
+pub mod parts;
 pub mod places;
 pub mod plan;
 pub mod record;

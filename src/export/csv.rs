@@ -91,8 +91,9 @@ pub fn write_final(
     let stress = |i: usize, k: usize| stresses.map(|all| all[i].map(|stress| stress.components[k]));
     let of_lattice = |i: usize| body.numbering.is_none() && body.sites[i][0] != Body::ALONG_OUTLINE;
     let at_sites = (0..body.count()).filter(|&i| of_lattice(i)).map(|i| body.sites[i]);
-    let lowest = |axis: usize| at_sites.clone().map(|site| i64::from(site[axis])).min().unwrap_or(0);
-    let (first_column, first_row) = (lowest(0), lowest(1));
+    let lowest = |axis: usize| at_sites.clone().map(|site| site[axis]).min().unwrap_or(0);
+    let lowest = body.part.as_ref().map_or_else(|| [lowest(0), lowest(1)], |part| part.whole.lowest);
+    let [first_column, first_row] = lowest.map(i64::from);
     // Energies and strains are found as they are written: all of them at once would take as much memory as the body.
     let rows = body.rows().map(|i| (i, engine.strain(i))).map(|(i, strain)| FinalRow {
         id: body.id(i),
