@@ -67,6 +67,12 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
     program + RUNNING + stepped(plan) + snapshots + most
 }
 
+/// Bytes that a rank with a part of a body takes at its largest, by a program whose own code takes so many: there are no
+/// figures and no report, and tables are written row by row.
+pub fn of_part(plan: &Plan, program: usize) -> usize {
+    program + RUNNING + stepped(plan)
+}
+
 /// Bytes of what the figures of so many steps are while they are drawn, as many at once as there are threads.
 fn pictures(scene: &Scene, plan: &Plan, moments: usize) -> usize {
     /// Memory of the renderer with its fonts; that of one more at the same time.
