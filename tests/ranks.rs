@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::atomic::AtomicBool;
 use std::thread;
 
+use flockform::continuum::digest::{digest, digest_of_parts};
 use flockform::continuum::equilibrium::{run_to_equilibrium_shared, run_to_equilibrium_watched};
 use flockform::continuum::parts::laid_out_whole_for;
 use flockform::continuum::plan::Plan;
@@ -592,9 +593,11 @@ fn an_error_in_a_halo_of_a_solver_is_seen_in_the_bits() {
 /// The end of a body of which each rank has a part, put together.
 fn parted(scene: &Scene, every: usize, ranks: usize) -> End {
     assert_eq!(laid_out_whole_for(scene), None);
+    let sum = digest(&planned(scene));
     let ends = on_ranks(ranks, |team| {
         let plan = Plan::of_part(scene, &team).unwrap_or_else(|error| panic!("{error}"));
         let (count, owned) = (plan.count(), plan.setup.body.owned());
+        assert_eq!(digest_of_parts(&plan, &team), sum);
         let mut looks = Looks::every(if team.is_first() { every } else { 1 });
         let outcome = run_shared(plan, None, &team, &mut looks).expect("can be shared");
         let engine = &outcome.engine;

@@ -61,7 +61,9 @@ fn digest_of(plan: &Plan, team: Option<&Team>) -> u64 {
         Weights::Scalar(weights) => each(&mut digest, &|digest| digest.numbers(&weights[bonds.clone()])),
         weights => digest.weights(weights),
     }
-    flock.forces.iter().chain(&flock.rest).for_each(|points| digest.points(points));
+    for component in flock.forces.iter().chain(&flock.rest).flat_map(|points| [&points.x, &points.y]) {
+        each(&mut digest, &|digest| digest.numbers(&component[owned.clone()]));
+    }
     if let Some(ramp) = ramp {
         digest.text(&format!("ramp {ramp}"));
     }

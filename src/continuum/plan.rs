@@ -80,7 +80,17 @@ impl Plan {
                 return Err(layout.holds_none(scene, &format!("roles[{k}].region")));
             }
         }
-        agreed(scene, team, Self::of_layout(scene, layout, changes))
+        let mut plan = agreed(scene, team, Self::of_layout(scene, layout, changes))?;
+        plan.agree_on_rest(team);
+        Ok(plan)
+    }
+
+    /// Keeps rest offsets if any particle of the body needs one: those that stand at the ends of a part alone do.
+    fn agree_on_rest(&mut self, team: &Team) {
+        let Setup { body, flock, .. } = &mut self.setup;
+        let is_needed = |rest: &Vectors| body.owned().any(|i| rest.get(i) != [0.0; 2]);
+        let is_needed = team.any(flock.rest.as_ref().is_some_and(is_needed));
+        flock.rest = flock.rest.take().or_else(|| Some(Vectors::zeros(body.count()))).filter(|_| is_needed);
     }
 
     /// The part of a rank, planned without the others: what needs them is not checked.

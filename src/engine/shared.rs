@@ -176,7 +176,8 @@ fn receive<const N: usize>(team: &Team, domain: &Domain, steps: usize, mut point
 }
 
 impl Part {
-    fn held(&self) -> Held {
+    /// For the sweep, which knows no bodies.
+    pub fn held(&self) -> Held {
         let ends = |of: &Range<usize>| [of.start, of.end];
         Held { first: self.first, total: self.total, owned: ends(&self.owned), exact: ends(&self.exact) }
     }

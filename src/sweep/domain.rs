@@ -85,6 +85,11 @@ impl Needs {
         Self { owned, steps: 0, needed: vec![all; MOST_STEPS + 1] }
     }
 
+    /// Most steps together, and how many particles of others they need; of a rank that looks at each step all that it has.
+    pub fn most(&self) -> (usize, usize) {
+        (self.steps, self.needed[self.steps].len() - self.owned.len())
+    }
+
     /// For another rank.
     pub fn words(&self) -> [u64; NEED_WORDS] {
         let ends = |of: &Range<usize>| [of.start as u64, of.end as u64];
