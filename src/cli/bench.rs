@@ -57,6 +57,10 @@ pub enum BenchCommand {
         /// Small bodies and few repetitions: a trial run, whose times mean nothing
         #[arg(long)]
         quick: bool,
+        /// Also two ranks, or those under mpirun, on large bodies: sweeps of 4096 x 4096 beside as many threads, and the
+        /// equilibrium of 1056 x 1056 cells; takes several GB and minutes
+        #[arg(long)]
+        large: bool,
         /// Most ranks, where they are threads of this process [default: one for each core, at most 8]
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=64))]
         ranks: Option<u8>,
@@ -96,8 +100,12 @@ pub fn bench(command: BenchCommand) -> Result<(), Refusal> {
                 interrupt::commit(folder)?;
             }
         }
-        BenchCommand::Scale { json, quick, ranks, out } => {
-            scale(bench::scale::Options { quick, ranks: ranks.map(usize::from) }, json, out.as_deref())?;
+        BenchCommand::Scale { json, quick, large, ranks, out } => {
+            scale(
+                bench::scale::Options { quick, large, ranks: ranks.map(usize::from) },
+                json,
+                out.as_deref(),
+            )?;
         }
         #[cfg(feature = "fem")]
         BenchCommand::Equilibrium { json, quick } => {
@@ -120,7 +128,7 @@ fn scale(options: bench::scale::Options, json: bool, out: Option<&Path>) -> Resu
         Ok(folder) => folder,
         Err(refusal) => return Err(start.refused(refusal.into())),
     };
-    start.begin(u64::from(options.quick))?;
+    start.begin(u64::from(options.quick) | u64::from(options.large) << 1)?;
     let report = bench::scale::run(&options, team.as_ref())?;
     if is_first {
         print_report(&report, json)?;

@@ -121,7 +121,10 @@ impl Prepared {
             begin.agree(fnv1a(&serde_json::to_vec(&scene.raw).expect("a scene was read from text")))?;
             let plan = Plan::of_part(&scene, team)?;
             let digest = digest_of_parts(&plan, team);
-            memory::require(&scene, (ranks::others_here() + 1) as f64 * memory::of_part(&plan) as f64)?;
+            memory::require(
+                &scene,
+                (ranks::others_here() + 1) as f64 * memory::of_part(&plan, team.count()) as f64,
+            )?;
             left.as_mut().map_or(Ok(()), |left| left.fit(&scene, &plan, digest))?;
             return Ok(Self { left, asked, scene, words: String::new(), plan, digest, is_parted });
         }

@@ -11,6 +11,7 @@ use super::error::ExportError;
 use super::figures::chart::{Axis, Chart, Series, Style, draw_below_each_other};
 use super::figures::{self, SERIES};
 use super::summary::write_signed;
+use crate::bench::scale::large::AtRest;
 use crate::bench::scale::model::Link;
 use crate::bench::scale::{Case, Predicted, Report};
 
@@ -70,7 +71,24 @@ pub fn figure(report: &Report) -> String {
         ("As much of a body for each rank", format!("predicted: {each} x {high} particles each")),
         (&report.weak, [|one| one.weak_efficiency, |one| one.weak_efficiency_on_network]),
     );
-    draw_below_each_other(&[strong, weak])
+    let beads = |name: &str, colour: usize, of: fn(&AtRest) -> f64| {
+        let points = report.at_rest.iter().map(|one| [one.ranks as f64, of(one)]).collect();
+        Series { name: name.into(), colour: SERIES[colour], style: Style::Beads, points }
+    };
+    let at_rest = Chart {
+        title: "An equilibrium by multigrid on more ranks".into(),
+        note: format!("measured here, ranks are {}", report.ranks_are),
+        axes: [
+            Axis { quantity: "ranks", unit: "", is_log: true },
+            Axis { quantity: "times as fast as one rank", unit: "", is_log: false },
+        ],
+        series: vec![
+            beads("measured", 0, |one| one.speed_up),
+            beads("as many times as there are ranks", 1, |one| one.ranks as f64),
+        ],
+        landmarks: Vec::new(),
+    };
+    draw_below_each_other(&[strong, weak, at_rest])
 }
 
 type Efficiency = fn(&Predicted) -> f64;
