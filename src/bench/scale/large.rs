@@ -165,9 +165,9 @@ fn plate(cells: usize) -> System {
 title = "A plate that is pulled"
 lattice = {{ kind = "square", spacing = 1.0 }}
 body.shape = {{ kind = "rectangle", max = [{cells}.0, {cells}.0] }}
-material = {{ young = 1000.0, poisson = 0.3, plane = "stress" }}
+material = {{ kind = "isotropic", young = 1000.0, poisson = 0.3 }}
 rule.mean = {{ kind = "material" }}
-loads = [{{ region = {{ kind = "edge", side = "right" }}, traction = [1.0, 0.0] }}]
+loads = [{{ kind = "traction", region = {{ kind = "edge", side = "right" }}, traction = [1.0, 0.0] }}]
 roles = [{{ region = {{ kind = "edge", side = "left" }}, role = "clamped" }}]
 equilibrium = {{ solver = "multigrid" }}
 "#
