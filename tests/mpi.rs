@@ -186,6 +186,29 @@ fn what_is_wrong_is_said_once_and_nothing_is_left() {
             ],
             "no equilibrium can be solved for",
         ),
+        (
+            [
+                &["run", "tension", "--set", "roles[1].region={kind=\"box\",min=[900,0],max=[901,1]}"],
+                &PARTED[..],
+            ]
+            .concat(),
+            "no particle of the body lies in this region",
+        ),
+        (
+            [
+                &[
+                    "run",
+                    "tension",
+                    "--set",
+                    "frame=none",
+                    "--set",
+                    "body={shape={kind=\"rectangle\",max=[60,4]},holes=[{kind=\"rectangle\",min=[29,-1],max=[33,5]}]}",
+                ],
+                &PARTED[..],
+            ]
+            .concat(),
+            "the body falls into 2 parts that are no neighbours of each other: particle 1 and particle 146",
+        ),
         (vec!["compare", "beam"], "`compare` runs on one"),
         (vec!["live", "tension"], "`live` runs on one"),
         (vec!["run", "tension", "--out", "/proc/none"], "cannot create /proc/"),
@@ -261,6 +284,111 @@ fn ranks_with_different_programs_are_refused() {
     assert_eq!(names_in(folder.path()), ["other"]);
 }
 
+/// What keeps a run from being looked at as a whole: each rank lays out a part of the body.
+const PARTED: [&str; 5] = ["--no-report", "--figures", "none", "--set", "record.probes=[]"];
+
+#[test]
+#[ignore = "needs mpirun"]
+fn a_run_in_parts_writes_the_tables_of_a_run_alone() {
+    let folder = temporary();
+    let fine = ["--set", "body.shape={kind=\"grid\",columns=300,rows=40}", "--steps", "100"];
+    for (name, more) in [("tension", &fine[..]), ("tension-immediate", &[]), ("lattice-honeycomb", &[])] {
+        let run = |out: &'static str| [&["run", name, "--out", out][..], &PARTED, more].concat();
+        assert_ends_well(&flockform(&run("alone"), folder.path()), name);
+        for (ranks, out) in [(2, "two"), (4, "four")] {
+            let output = on_ranks(ranks, &run(out), folder.path());
+            assert_ends_well(&output, name);
+            let said = text(&output.stdout);
+            assert_eq!(said.matches("results in").count(), 1, "only one rank speaks: {said}");
+            let [found, expected] = [out, "alone"].map(|out| folder.path().join(out));
+            assert_same(&found, &expected, &format!("{name} in {ranks} parts"));
+            std::fs::remove_dir_all(found).expect("removed");
+        }
+        std::fs::remove_dir_all(folder.path().join("alone")).expect("removed");
+    }
+}
+
+#[test]
+#[ignore = "needs mpirun"]
+fn every_rank_writes_its_piece_of_a_frame() {
+    let folder = temporary();
+    let run = ["run", "tension", "--out", "o", "--steps", "30", "--set", "record.vtk_every=20"];
+    assert_ends_well(&on_ranks(3, &[&run[..], &PARTED].concat(), folder.path()), "frames");
+    let read = |file: &str| std::fs::read_to_string(folder.path().join("o").join(file)).expect(file);
+    for step in ["000000", "000020", "000030"] {
+        assert!(read("steps.pvd").contains(&format!("steps/step_{step}.pvtu")));
+        let list = read(&format!("steps/step_{step}.pvtu"));
+        for rank in 0..3 {
+            let piece = format!("step_{step}_000{rank}.vtu");
+            assert!(list.contains(&format!("<Piece Source=\"{piece}\"/>")), "{list}");
+            assert!(read("flockform-files.txt").contains(&format!("steps/{piece}\n")));
+            // The list names the arrays of the pieces, and no others.
+            let names = |text: &str| {
+                let of = |part: &str| part.split('"').next().map(str::to_owned);
+                let mut names: Vec<_> = text.split(" Name=\"").skip(1).filter_map(of).collect();
+                names.retain(|name| !["connectivity", "offsets", "types"].contains(&name.as_str()));
+                names
+            };
+            assert_eq!(names(&list), names(&read(&format!("steps/{piece}"))));
+        }
+    }
+}
+
+/// A long run in parts.
+const LONG_IN_PARTS: [&str; 16] = [
+    "run",
+    "tension",
+    "--out",
+    "o",
+    "--quiet",
+    "--checkpoint-every",
+    "50steps",
+    "--steps",
+    "600",
+    "--set",
+    "body.shape={kind=\"grid\",columns=60,rows=40}",
+    "--no-report",
+    "--figures",
+    "none",
+    "--set",
+    "record.probes=[]",
+];
+
+#[test]
+#[ignore = "needs mpirun"]
+fn a_run_in_parts_goes_on_in_any_number_of_parts_and_alone() {
+    let expected = alone(&LONG_IN_PARTS);
+    for victim in 0..3 {
+        let folder = temporary();
+        let (mut run, ranks) = begun(3, &LONG_IN_PARTS, (victim + 1) % 3, folder.path());
+        let parts = names_in(&folder.path().join("o.unfinished"));
+        let parts = parts.iter().filter(|name| name.starts_with("checkpoint.")).count();
+        // While one is made, that of the step before is there too.
+        assert!([2, 3, 4].contains(&parts), "{parts}");
+        signal("KILL", ranks[victim]);
+        let (is_well, said) = ended(&mut run);
+        assert!(!is_well, "{said}");
+        // One more than there were, alone, or as many.
+        let ranks = [4, 1, 3][victim];
+        assert_resumes(
+            ranks,
+            folder.path(),
+            expected.path(),
+            &format!("rank {victim} killed, {ranks} go on"),
+        );
+    }
+    // What was begun alone goes on in parts.
+    let folder = temporary();
+    let run = Running(mpirun(1, &LONG_IN_PARTS, folder.path()).spawn().expect("mpirun is installed"));
+    wait_for_checkpoint(folder.path());
+    ranks_of(&run.0).into_iter().for_each(|process| signal("KILL", process));
+    let mut run = run;
+    let _ = ended(&mut run);
+    if !folder.path().join("o").exists() {
+        assert_resumes(2, folder.path(), expected.path(), "alone, then two");
+    }
+}
+
 /// A run that is looked at after each of its steps, which take a while on ranks, with checkpoints.
 #[rustfmt::skip]
 const fn long(steps: &'static str) -> [&'static str; 12] {
@@ -275,15 +403,15 @@ const LONG: [&str; 12] = long("1500");
 const LONGER: [&str; 12] = long("15000");
 
 /// A long run alone, in a folder of its own.
-fn alone(long: [&str; 12]) -> tempfile::TempDir {
+fn alone(long: &[&str]) -> tempfile::TempDir {
     let folder = temporary();
-    assert_ends_well(&flockform(&long, folder.path()), "alone");
+    assert_ends_well(&flockform(long, folder.path()), "alone");
     folder
 }
 
 /// A long run on ranks, and their process ids.
-fn started(ranks: usize, long: [&str; 12], folder: &Path) -> (Running, Vec<u32>) {
-    let run = Running(mpirun(ranks, &long, folder).spawn().expect("mpirun is installed"));
+fn started(ranks: usize, long: &[&str], folder: &Path) -> (Running, Vec<u32>) {
+    let run = Running(mpirun(ranks, long, folder).spawn().expect("mpirun is installed"));
     let found = || Some(ranks_of(&run.0)).filter(|found| found.len() == ranks);
     let processes = within(PATIENCE, "all ranks", found);
     (run, processes)
@@ -291,8 +419,8 @@ fn started(ranks: usize, long: [&str; 12], folder: &Path) -> (Running, Vec<u32>)
 
 /// The same once it has kept a checkpoint; so that it does not end before it is asked to, one rank is frozen, for which the
 /// others wait.
-fn begun(ranks: usize, frozen: usize, folder: &Path) -> (Running, Vec<u32>) {
-    let (run, processes) = started(ranks, LONG, folder);
+fn begun(ranks: usize, long: &[&str], frozen: usize, folder: &Path) -> (Running, Vec<u32>) {
+    let (run, processes) = started(ranks, long, folder);
     wait_for_checkpoint(folder);
     signal("STOP", processes[frozen]);
     (run, processes)
@@ -340,10 +468,10 @@ fn ranks_of(mpirun: &Child) -> Vec<u32> {
 #[test]
 #[ignore = "needs mpirun"]
 fn a_killed_rank_ends_the_run_which_goes_on_with_any_number_of_ranks() {
-    let expected = alone(LONG);
+    let expected = alone(&LONG);
     for victim in 0..3 {
         let folder = temporary();
-        let (mut run, ranks) = begun(3, (victim + 1) % 3, folder.path());
+        let (mut run, ranks) = begun(3, &LONG, (victim + 1) % 3, folder.path());
         signal("KILL", ranks[victim]);
         let killed = Instant::now();
         let (is_well, said) = ended(&mut run);
@@ -361,10 +489,10 @@ fn a_killed_rank_ends_the_run_which_goes_on_with_any_number_of_ranks() {
 #[test]
 #[ignore = "needs mpirun"]
 fn a_rank_killed_at_any_moment_costs_no_more_than_the_last_checkpoint() {
-    let expected = alone(LONG);
+    let expected = alone(&LONG);
     let undisturbed = {
         let folder = temporary();
-        let (mut run, _) = started(2, LONG, folder.path());
+        let (mut run, _) = started(2, &LONG, folder.path());
         let begin = Instant::now();
         assert!(ended(&mut run).0);
         begin.elapsed()
@@ -377,7 +505,7 @@ fn a_rank_killed_at_any_moment_costs_no_more_than_the_last_checkpoint() {
         let (victim, after) =
             (random as usize % 2, undisturbed.mul_f64((random >> 32) as f64 / 2f64.powi(32)));
         let what = format!("rank {victim} killed after {after:?} of {undisturbed:?}");
-        let (mut run, ranks) = started(2, LONG, folder.path());
+        let (mut run, ranks) = started(2, &LONG, folder.path());
         std::thread::sleep(after);
         signals::is_sent("KILL", ranks[victim]);
         let (_, said) = ended(&mut run);
@@ -397,9 +525,9 @@ fn a_rank_killed_at_any_moment_costs_no_more_than_the_last_checkpoint() {
 #[test]
 #[ignore = "needs mpirun"]
 fn an_interrupt_of_the_launcher_ends_the_run_which_goes_on_to_the_same_bits() {
-    let expected = alone(LONGER);
+    let expected = alone(&LONGER);
     let folder = temporary();
-    let (mut run, _) = started(3, LONGER, folder.path());
+    let (mut run, _) = started(3, &LONGER, folder.path());
     wait_for_checkpoint(folder.path());
     signal("INT", run.0.id());
     let interrupted = Instant::now();
@@ -412,9 +540,9 @@ fn an_interrupt_of_the_launcher_ends_the_run_which_goes_on_to_the_same_bits() {
 #[test]
 #[ignore = "needs mpirun"]
 fn an_interrupt_of_one_rank_ends_all_at_one_step_from_which_the_run_goes_on() {
-    let expected = alone(LONG);
+    let expected = alone(&LONG);
     let folder = temporary();
-    let (mut run, ranks) = begun(3, 1, folder.path());
+    let (mut run, ranks) = begun(3, &LONG, 1, folder.path());
     // It is not told by the launcher, which would kill what takes longer than it likes.
     signal("TERM", ranks[1]);
     signal("CONT", ranks[1]);

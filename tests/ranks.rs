@@ -4,7 +4,9 @@ use std::ops::ControlFlow;
 use std::sync::atomic::AtomicBool;
 use std::thread;
 
+use flockform::continuum::digest::{digest, digest_of_parts};
 use flockform::continuum::equilibrium::{run_to_equilibrium_shared, run_to_equilibrium_watched};
+use flockform::continuum::parts::laid_out_whole_for;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, SharedError, require_shareable, run_shared, run_watched};
 use flockform::continuum::shares::{Exchanged, Shares};
@@ -586,4 +588,93 @@ fn an_error_in_a_halo_of_a_solver_is_seen_in_the_bits() {
     let found = on_ranks(2, |team| solved_on(&scene, &plan, &Team::new(Noisy(team))));
     // It may find no equilibrium at all.
     assert!(found.into_iter().all(|rest| rest.map_or(true, |rest| rest != expected)));
+}
+
+/// The end of a body of which each rank has a part, put together.
+fn parted(scene: &Scene, every: usize, ranks: usize) -> End {
+    assert_eq!(laid_out_whole_for(scene), None);
+    let sum = digest(&planned(scene));
+    let ends = on_ranks(ranks, |team| {
+        let plan = Plan::of_part(scene, &team).unwrap_or_else(|error| panic!("{error}"));
+        let (count, owned) = (plan.count(), plan.setup.body.owned());
+        assert_eq!(digest_of_parts(&plan, &team), sum);
+        let mut looks = Looks::every(if team.is_first() { every } else { 1 });
+        let outcome = run_shared(plan, None, &team, &mut looks).expect("can be shared");
+        let engine = &outcome.engine;
+        let of = |points: &Vectors| {
+            points.x[owned.clone()].to_vec().into_iter().zip(points.y[owned.clone()].to_vec())
+        };
+        let places: Vec<_> = of(engine.present()).zip(of(engine.previous())).collect();
+        let energies: Vec<_> = owned.clone().map(|i| [engine.pe1(i), engine.pe2(i)]).collect();
+        let roles = engine.roles()[owned.clone()].to_vec();
+        let sums = engine.energies();
+        (
+            places,
+            energies,
+            roles,
+            (engine.step(), format!("{:?}", outcome.reason)),
+            (outcome.residual, sums),
+            count,
+        )
+    });
+    let (step, reason) = ends[0].3.clone();
+    let (residual, sums) = ends[0].4;
+    let mut end = End {
+        step,
+        reason,
+        places: Vec::new(),
+        residual: residual.to_bits(),
+        breaks: "[]".to_owned(),
+        roles: String::new(),
+        seen: Vec::new(),
+    };
+    for one in &ends {
+        assert_eq!((&one.3.0, &one.3.1), (&end.step, &end.reason));
+        assert_eq!((one.4.0.to_bits(), one.4.1.map(f64::to_bits)), (end.residual, sums.map(f64::to_bits)));
+    }
+    let all =
+        |of: &dyn Fn(usize) -> Vec<f64>| (0..ends.len()).flat_map(of).map(f64::to_bits).collect::<Vec<_>>();
+    end.places.extend(all(&|r| ends[r].0.iter().map(|(now, _)| now.0).collect()));
+    end.places.extend(all(&|r| ends[r].0.iter().map(|(now, _)| now.1).collect()));
+    end.places.extend(all(&|r| ends[r].0.iter().map(|(_, then)| then.0).collect()));
+    end.places.extend(all(&|r| ends[r].0.iter().map(|(_, then)| then.1).collect()));
+    end.places.extend(all(&|r| ends[r].1.iter().flatten().copied().collect()));
+    let roles: Vec<_> = ends.iter().flat_map(|one| one.2.clone()).collect();
+    end.roles = format!("{roles:?}");
+    end.seen.push((ends.iter().map(|one| one.5).max().unwrap_or(0), 0));
+    end
+}
+
+fn assert_parted_the_same(name: &str, sets: &[&str], every: usize) {
+    let scene = load(name, sets);
+    let expected = End { seen: Vec::new(), ..alone(&scene, every) };
+    for ranks in [2, 3, 5, 8] {
+        let found = End { seen: Vec::new(), ..parted(&scene, every, ranks) };
+        let what = format!("{name} {sets:?} in {ranks} parts");
+        assert_eq!(
+            (found.step, &found.reason, found.residual),
+            (expected.step, &expected.reason, expected.residual),
+            "{what}"
+        );
+        assert!(found.roles == expected.roles, "{what}: roles");
+        assert!(found == expected, "{what}");
+    }
+}
+
+#[test]
+fn a_body_laid_out_in_parts_has_the_bits_of_one_laid_out_as_a_whole() {
+    let small = ["record.probes=[]", "stop.steps=60"];
+    for (name, more) in [
+        ("tension", &["frame=none"][..]),
+        ("tension", &[]),
+        ("tension-immediate", &[]),
+        ("feedback-oscillate", &[]),
+        ("poisson-term", &[]),
+        ("power-mean", &[]),
+        ("distance-weights", &[]),
+        ("lattice-honeycomb", &[]),
+        ("lattice-hexagonal", &[]),
+    ] {
+        assert_parted_the_same(name, &[&small[..], more].concat(), 25);
+    }
 }

@@ -52,6 +52,10 @@ pub enum BenchCommand {
     Scale {
         #[command(flatten)]
         bench: BenchArguments,
+        /// Also two ranks, or those under mpirun, on large bodies: sweeps of 4096 x 4096 beside as many threads, and the
+        /// equilibrium of 1056 x 1056 cells; takes several GB and minutes
+        #[arg(long)]
+        large: bool,
         /// Most ranks, where they are threads of this process [default: one for each core, at most 8]
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=64))]
         ranks: Option<u8>,
@@ -80,7 +84,7 @@ pub fn bench(command: BenchCommand) -> Result<(), Refusal> {
             }
             Ok(())
         }
-        BenchCommand::Scale { bench, ranks, out } => scale(bench, ranks.map(usize::from), &out),
+        BenchCommand::Scale { bench, large, ranks, out } => scale(bench, large, ranks.map(usize::from), &out),
         #[cfg(feature = "fem")]
         BenchCommand::Equilibrium(bench) => bench.print(&bench::equilibrium::run(bench.quick)?),
     }
@@ -99,7 +103,12 @@ impl OutArguments {
 }
 
 /// Every rank measures, and the first one says what was found.
-fn scale(bench: BenchArguments, ranks: Option<usize>, out: &OutArguments) -> Result<(), Refusal> {
+fn scale(
+    bench: BenchArguments,
+    large: bool,
+    ranks: Option<usize>,
+    out: &OutArguments,
+) -> Result<(), Refusal> {
     let team = team()?;
     let start = Start::new(team.as_ref());
     let is_first = team.as_ref().is_none_or(Team::is_first);
@@ -107,8 +116,8 @@ fn scale(bench: BenchArguments, ranks: Option<usize>, out: &OutArguments) -> Res
         Ok(folder) => folder,
         Err(refusal) => return Err(start.refused(refusal)),
     };
-    start.begin(u64::from(bench.quick))?;
-    let options = bench::scale::Options { quick: bench.quick, ranks };
+    start.begin(u64::from(bench.quick) | u64::from(large) << 1)?;
+    let options = bench::scale::Options { quick: bench.quick, large, ranks };
     let report = bench::scale::run(&options, team.as_ref())?;
     if is_first {
         bench.print(&report)?;

@@ -5,12 +5,14 @@ use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use flockform::continuum::plan::Plan;
 use flockform::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use flockform::engine::Engine;
 use flockform::engine::state::EngineState;
 use flockform::export::checkpoint::{Checkpoint, CheckpointError, RunRequest};
 use flockform::export::report::RunRecorder;
 use flockform::export::{ExportError, OutputFolder, VtkSeries, unfinished};
+use flockform::ranks::Team;
 use flockform::scene::Scene;
 
 use super::interrupt;
@@ -74,6 +76,8 @@ impl CheckpointArguments {
 /// A run that was killed or interrupted.
 pub struct ResumedRun {
     pub checkpoint: Checkpoint<'static>,
+    /// Of the checkpoint as it was read, on every rank alike.
+    pub fingerprint: u64,
     /// Where it stands.
     folder: PathBuf,
     /// Where its results shall go.
@@ -87,15 +91,17 @@ impl ResumedRun {
         let out = stem.map_or_else(|| dir.to_owned(), |stem| dir.with_file_name(stem));
         for folder in [unfinished(&out), out.clone()] {
             if let Some(checkpoint) = Checkpoint::read(&folder)? {
-                return Ok(Self { checkpoint, folder, out });
+                let fingerprint = checkpoint.fingerprint();
+                return Ok(Self { checkpoint, fingerprint, folder, out });
             }
         }
         Err(CheckpointError::Nothing { unfinished: unfinished(&out), out })
     }
 
-    /// Refuses to go on with another scene.
-    pub fn require_of(&self, scene: &Scene, digest: u64) -> Result<(), CheckpointError> {
-        self.checkpoint.require_of(&self.folder, scene, digest)
+    /// Makes its state that of the body, or of the part of it, that the plan has; refuses to go on with another scene.
+    pub fn fit(&mut self, scene: &Scene, plan: &Plan, digest: u64) -> Result<(), CheckpointError> {
+        self.checkpoint.require_of(&self.folder, scene, digest)?;
+        self.checkpoint.join(&self.folder, &plan.setup)
     }
 
     /// The folder to go on filling.
@@ -190,11 +196,51 @@ impl<'a> Checkpointer<'a> {
         self.last = Instant::now();
     }
 
+    /// Keeps a run of which each rank has a part, by all of them together; the first one has the folder, in which the others
+    /// write too, and the frames. Returns whether it is kept.
+    pub fn keep_parts(
+        &mut self,
+        folder: Option<&mut OutputFolder>,
+        (engine, residual): (&Engine, f64),
+        frames: Option<&mut VtkSeries>,
+        team: &Team,
+    ) -> bool {
+        (self.last_step, self.last) = (engine.step(), Instant::now());
+        let path = folder.as_ref().map_or(&b""[..], |folder| folder.folder().as_os_str().as_encoded_bytes());
+        let paths = team.each_bytes(path);
+        let state = EngineState::of(engine);
+        let first = engine.body().id(engine.body().owned().start) - 1;
+        let parts = team.each([first as u64, state.count() as u64]);
+        let of = (&self.asked, self.scene, self.digest);
+        let own = Checkpoint::new(of, (state, residual), (&[], &[], &[], None), self.stepping());
+        let written = match &folder {
+            Some(_) => frames.map_or(Ok(()), VtkSeries::sync),
+            None => own.write_part(Path::new(&*String::from_utf8_lossy(&paths[0])), team.rank()),
+        };
+        let is_whole = !team.any(written.is_err());
+        let named = folder.filter(|_| is_whole).map_or(Ok(()), |folder| {
+            let parts: Vec<_> =
+                parts.iter().map(|&[first, count]| (first as usize, count as usize)).collect();
+            own.write_with_parts(folder.folder(), &parts)?;
+            interrupt::keep_unfinished(folder, resume_words)
+        });
+        let is_kept = is_whole && !team.any(named.is_err());
+        if let Err(error) = written.and(named) {
+            tracing::warn!("no checkpoint at step {}: {error}", self.last_step);
+        }
+        self.last = Instant::now();
+        is_kept
+    }
+
+    /// Whether a run that is broken off is to be gone on with.
+    pub fn is_asked(&self) -> bool {
+        self.every.iter().any(|interval| *interval != Interval::Never)
+    }
+
     /// Leaves a checkpoint of the last step, and says whether there is one. Frames are on their way to the disk then: to wait
     /// for each would take longer than an interrupt may.
     pub fn leave(&self, folder: &mut OutputFolder, engine: (&Engine, f64), kept: &Recorded<'_>) -> bool {
-        let is_asked = self.every.iter().any(|interval| *interval != Interval::Never);
-        if self.scene.equilibrium.is_some() || !is_asked {
+        if self.scene.equilibrium.is_some() || !self.is_asked() {
             return false;
         }
         let left = self.write(folder, engine, kept);

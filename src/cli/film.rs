@@ -52,6 +52,11 @@ pub struct AskedFilm {
 }
 
 impl BodyFilmArguments {
+    /// Whether a film is asked for.
+    pub fn is_asked(&self) -> bool {
+        self.film.is_some()
+    }
+
     /// The film, if one is asked for, in a colour that the body has.
     pub fn open(
         &self,

@@ -1,16 +1,18 @@
 //! `flockform plan`: a scene or a swarm before it runs.
 
 use clap::Args;
-use flockform::continuum::memory::{fallback, readable_bytes};
+use flockform::continuum::memory::{at_least, fallback, readable_bytes};
+use flockform::continuum::parts::laid_out_whole_for;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::report::PlanReport;
-use flockform::continuum::shares::Shares;
+use flockform::continuum::shares::{PartShares, Shares};
 use flockform::export::memory::Outputs;
+use flockform::scene::Scene;
 use flockform::study::compare::run::plan as plan_of;
 use flockform::swarm::plan::SwarmPlan;
 use serde_json::{Value, json};
 
-use super::memory::predicted;
+use super::memory::{of_part, predicted, require};
 use super::names::{FileName, Kind, SceneArguments};
 use super::ranks::RanksError;
 use super::swarm::SwarmFileArguments;
@@ -43,7 +45,20 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
             (plan.to_string(), json!(plan))
         }
         Kind::Scene => {
-            let scene = SceneArguments { scene: file.clone(), set: set.clone() }.load([])?;
+            let count = ranks.map_or(1, usize::from);
+            let parts = |scene: &Scene| if laid_out_whole_for(scene).is_none() { count } else { 1 };
+            let scene = SceneArguments { scene: file.clone(), set: set.clone() }.load_part(&[], parts)?;
+            let parts = PartShares::new(&scene, count)?;
+            let of_parts = parts.map(|parts| parts.facts(of_part(&parts.largest, count)));
+            if let (Some(facts), Err(too_large)) = (&of_parts, require(&scene, at_least(&scene))) {
+                // What is said of the whole would take the memory that it takes.
+                let facts = facts.iter().map(|(name, value)| json!({ "name": name, "value": value }));
+                let value = json!({ "name": scene.name, "title": scene.raw.title, "facts": facts.collect::<Vec<_>>() });
+                let words = of_parts.iter().flatten().map(|(name, value)| format!("{name}: {value}\n"));
+                let words = format!("{}\n{}", scene.raw.title, words.collect::<String>());
+                eprintln!("the whole is not planned here: {too_large}");
+                return if *json { Ok(print(&format!("{value:#}\n"))?) } else { Ok(say(&words)?) };
+            }
             let plan = plan_of(&scene)?;
             let mut report = PlanReport::new(&scene, &plan)?;
             let memory = [Outputs::ALL, Outputs::TABLES].map(|outputs| predicted(&scene, &plan, outputs));
@@ -56,6 +71,14 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
             report.facts.push(("memory".into(), words));
             if let Some(ranks) = ranks {
                 report.facts.extend(Shares::new(&scene, &plan, usize::from(*ranks))?.facts());
+                let whole_for = |key: String| {
+                    vec![(
+                        "parts".to_owned(),
+                        format!("none: each rank lays out the whole body, for `{key}`"),
+                    )]
+                };
+                let whole = || laid_out_whole_for(&scene).map_or_else(Vec::new, whole_for);
+                report.facts.extend(of_parts.unwrap_or_else(whole));
             }
             (report.to_string(), scene_json(&scene.name, &plan, &report, memory))
         }

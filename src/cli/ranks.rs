@@ -175,7 +175,7 @@ impl<'a> Start<'a> {
 
     /// Ends the others, and returns what is to be said here.
     pub fn refused(mut self, refusal: Refusal) -> Refusal {
-        let Some(team) = self.team else { return refusal };
+        let Some(team) = self.team.filter(|_| !self.is_over) else { return refusal };
         let rank = team.rank();
         match self.exchange(team, Word::Refused) {
             Verdict::Refused(first) if first != rank => RanksError::SaidElsewhere.into(),

@@ -14,6 +14,11 @@ pub struct RecordArguments {
 }
 
 impl RecordArguments {
+    /// Whether a recording is asked for.
+    pub fn is_asked(&self) -> bool {
+        self.record.is_some()
+    }
+
     /// The recording, if one is asked for; a file in its place is replaced with `force` alone. A process that goes on
     /// where another ended leaves that one's file (`.mcap.part`) and writes FILE.2.mcap, and so on.
     pub fn open(&self, about: &About, force: bool, life: u32) -> Result<Option<Shared>, RecordError> {

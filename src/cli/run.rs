@@ -1,6 +1,7 @@
 //! `flockform run`: plan, step, record, write; or go on where an earlier run was killed.
 
 mod observer;
+mod parts;
 mod recorder;
 mod words;
 
@@ -10,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use flockform::continuum::digest::{digest, fnv1a};
+use flockform::continuum::digest::{digest, digest_of_parts, fnv1a};
 use flockform::continuum::equilibrium::{run_to_equilibrium_shared, run_to_equilibrium_watched};
 use flockform::continuum::looks::Looks;
 use flockform::continuum::plan::Plan;
@@ -99,17 +100,33 @@ struct Prepared {
     words: String,
     plan: Plan,
     digest: u64,
+    /// Whether the plan is that of this rank's part of the body.
+    is_parted: bool,
 }
 
 impl Prepared {
-    fn new(arguments: &RunArguments, team: Option<&Team>) -> Result<Self, Refusal> {
-        let left = arguments.checkpoints.left()?;
+    fn new(arguments: &RunArguments, team: Option<&Team>, begin: &mut Start<'_>) -> Result<Self, Refusal> {
+        let mut left = arguments.checkpoints.left()?;
         let asked = arguments.asked(left.as_ref());
         let words_of = SceneArguments { scene: asked.scene.clone(), set: asked.set.clone() };
-        let scene = words_of.load([])?;
+        let parts = |scene: &Scene| if arguments.is_parted(scene) { team.map_or(1, Team::count) } else { 1 };
+        let scene = words_of.load_part(&[], parts)?;
         // Before a choice, which solves the scene several times.
         if team.is_some() {
             require_shareable(&scene)?;
+        }
+        let is_parted = team.is_some() && arguments.is_parted(&scene);
+        if let (Some(team), true) = (team, is_parted) {
+            // What follows all ranks do together.
+            begin.agree(fnv1a(&serde_json::to_vec(&scene.raw).expect("a scene was read from text")))?;
+            let plan = Plan::of_part(&scene, team)?;
+            let digest = digest_of_parts(&plan, team);
+            memory::require(
+                &scene,
+                (ranks::others_here() + 1) as f64 * memory::of_part(&plan, team.count()) as f64,
+            )?;
+            left.as_mut().map_or(Ok(()), |left| left.fit(&scene, &plan, digest))?;
+            return Ok(Self { left, asked, scene, words: String::new(), plan, digest, is_parted });
         }
         let Chosen { mut scene, words, .. } = choose(scene, &|more: &[String]| words_of.load_scene(more))?;
         if let Some(equilibrium) = &mut scene.equilibrium {
@@ -121,14 +138,14 @@ impl Prepared {
         let bytes = memory::predicted(&scene, &plan, arguments.outputs()) + of_others;
         memory::require(&scene, bytes as f64)?;
         let digest = digest(&plan);
-        left.as_ref().map_or(Ok(()), |left| left.require_of(&scene, digest))?;
-        Ok(Self { left, asked, scene, words, plan, digest })
+        left.as_mut().map_or(Ok(()), |left| left.fit(&scene, &plan, digest))?;
+        Ok(Self { left, asked, scene, words, plan, digest, is_parted })
     }
 
     /// A fingerprint of what all ranks must have in common: plan, scene, and the state to go on from.
     fn common(&self) -> u64 {
         let scene = serde_json::to_vec(&self.scene.raw).expect("a scene was read from text");
-        let state = self.left.iter().flat_map(|left| left.checkpoint.fingerprint().to_le_bytes());
+        let state = self.left.iter().flat_map(|left| left.fingerprint.to_le_bytes());
         let all: Vec<u8> = self.digest.to_le_bytes().into_iter().chain(scene).chain(state).collect();
         fnv1a(&all)
     }
@@ -137,10 +154,14 @@ impl Prepared {
 /// The part of a rank that neither prints nor writes.
 fn help_to_run(arguments: &RunArguments, team: &Team) -> Result<ExitCode, Refusal> {
     let mut begin = Start::new(Some(team));
-    let prepared = match Prepared::new(arguments, Some(team)) {
+    let start = Instant::now();
+    let prepared = match Prepared::new(arguments, Some(team), &mut begin) {
         Ok(prepared) => prepared,
         Err(refusal) => return Err(begin.refused(refusal)),
     };
+    if prepared.is_parted {
+        return parts::run(arguments, team, prepared, begin, start);
+    }
     let common = prepared.common();
     begin.agree(common)?;
     let mut observer = Interrupted(interrupt::serves());
@@ -155,9 +176,12 @@ fn help_to_run(arguments: &RunArguments, team: &Team) -> Result<ExitCode, Refusa
 fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, Refusal> {
     let start = Instant::now();
     let mut begin = Start::new(team);
-    let prepared = Prepared::new(arguments, team)?;
+    let prepared = Prepared::new(arguments, team, &mut begin)?;
+    if let (Some(team), true) = (team, prepared.is_parted) {
+        return parts::run(arguments, team, prepared, begin, start);
+    }
     let common = team.map_or(0, |_| prepared.common());
-    let Prepared { left, asked, scene, words, plan, digest } = prepared;
+    let Prepared { left, asked, scene, words, plan, digest, .. } = prepared;
     begin.agree(common)?;
     let shown = arguments.publish.as_ref();
     let open = |name: &String| Positions::open(&Domain::from_environment()?, name, plan.count());

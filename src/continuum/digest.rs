@@ -5,6 +5,7 @@ use crate::engine::setup::{Conduct, Setup};
 use crate::flock::action::ActionKind;
 use crate::flock::law::Weights;
 use crate::flock::vectors::Vectors;
+use crate::ranks::Team;
 
 /// FNV-1a hash of bytes (G. Fowler, L. C. Noll, K.-P. Vo): 64 bits, the same in every build, not secure against
 /// forgery. The hashes of the standard library differ from version to version.
@@ -16,16 +17,53 @@ pub fn fnv1a(bytes: &[u8]) -> u64 {
 
 /// A fingerprint of everything in a plan that its run depends on, to distinguish plans: an FNV-1a hash, see [`fnv1a`].
 pub fn digest(plan: &Plan) -> u64 {
+    digest_of(plan, None)
+}
+
+/// The fingerprint of a plan of which each rank has a part, found by all of them together: that of the whole.
+pub fn digest_of_parts(plan: &Plan, team: &Team) -> u64 {
+    digest_of(plan, Some(team))
+}
+
+fn digest_of(plan: &Plan, team: Option<&Team>) -> u64 {
     let mut digest = Fnv::default();
+    // Goes through the ranks in their order, as the particles do.
+    let each = |digest: &mut Fnv, work: &dyn Fn(&mut Fnv)| match team {
+        None => work(digest),
+        Some(team) => {
+            let add = |[hash]: [u64; 1]| {
+                let mut part = Fnv(hash);
+                work(&mut part);
+                [part.0]
+            };
+            [digest.0] = team.chain([digest.0], add);
+        }
+    };
     let Plan { setup, stop, probes, .. } = plan;
     let Setup { body, flock, update, present_radius, roles, changes, cuts, actions, ramp, .. } = setup;
-    digest.points(&body.reference);
+    let (owned, first) = (body.owned(), body.part.as_ref().map_or(0, |part| part.first));
+    let starts = &flock.neighbours.starts;
+    let bonds = starts[owned.start] as usize..starts[owned.end] as usize;
+    each(&mut digest, &|digest| digest.numbers(&body.reference.x[owned.clone()]));
+    each(&mut digest, &|digest| digest.numbers(&body.reference.y[owned.clone()]));
     digest.text(&format!("{update:?} {present_radius:?} {stop:?} {:?} {cuts:?}", flock.rule));
-    roles.iter().for_each(|role| digest.text(role.name()));
-    flock.neighbours.starts.iter().for_each(|start| digest.bytes(&start.to_le_bytes()));
-    flock.neighbours.index.iter().for_each(|index| digest.bytes(&index.to_le_bytes()));
-    digest.weights(&flock.weights);
-    flock.forces.iter().chain(&flock.rest).for_each(|points| digest.points(points));
+    each(&mut digest, &|digest| roles[owned.clone()].iter().for_each(|role| digest.text(role.name())));
+    digest.bytes(&0u32.to_le_bytes());
+    let own = bonds.len() as u64;
+    let before = team.map_or(0, |team| team.each([own]).iter().take(team.rank()).map(|[bonds]| bonds).sum());
+    let start = |start: u32| (u64::from(start) - bonds.start as u64 + before) as u32;
+    let ends = &starts[owned.start + 1..owned.end + 1];
+    each(&mut digest, &|digest| ends.iter().for_each(|&end| digest.bytes(&start(end).to_le_bytes())));
+    let seen = |index: u32| (first + index as usize) as u32;
+    let index = &flock.neighbours.index[bonds.clone()];
+    each(&mut digest, &|digest| index.iter().for_each(|&index| digest.bytes(&seen(index).to_le_bytes())));
+    match &flock.weights {
+        Weights::Scalar(weights) => each(&mut digest, &|digest| digest.numbers(&weights[bonds.clone()])),
+        weights => digest.weights(weights),
+    }
+    for component in flock.forces.iter().chain(&flock.rest).flat_map(|points| [&points.x, &points.y]) {
+        each(&mut digest, &|digest| digest.numbers(&component[owned.clone()]));
+    }
     if let Some(ramp) = ramp {
         digest.text(&format!("ramp {ramp}"));
     }
@@ -35,7 +73,10 @@ pub fn digest(plan: &Plan) -> u64 {
     for change in changes {
         let what = format!("{:?} {} {:?} {:?}", change.role, change.from, change.when, change.motion);
         digest.text(&what);
-        change.particles.iter().for_each(|&particle| digest.bytes(&(particle as u64).to_le_bytes()));
+        let own = change.particles.iter().filter(|particle| owned.contains(particle));
+        each(&mut digest, &|digest| {
+            own.clone().for_each(|&particle| digest.bytes(&((first + particle) as u64).to_le_bytes()));
+        });
     }
     for action in actions {
         digest.text(&format!("action {}", action.at));

@@ -64,13 +64,24 @@ impl Layout {
             of_lattice => Self::of_whole_cells(scene, of_lattice)?,
         };
         if !matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. }) {
-            layout.body.require_connected(&layout.neighbours).map_err(|error| {
-                let help =
-                    "close the gap, use a wider neighbourhood, or run the parts as scenes of their own";
-                scene.refuse("body.shape", error.to_string(), help)
-            })?;
+            let connected = layout.body.require_connected(&layout.neighbours);
+            connected.map_err(|error| refuse_pieces(scene, &error))?;
         }
         Ok(layout)
+    }
+
+    /// A part of a body of particles alone, which stand on a lattice.
+    ///
+    /// # Errors
+    /// Coordinates that doubles cannot resolve.
+    pub(super) fn of_part(scene: &Scene, body: Body, neighbours: Neighbours) -> Result<Self, SceneError> {
+        require_in_range(scene)?;
+        require_resolved(scene, &body)?;
+        let outline = match &scene.body {
+            BodySource::Cut(Cut::Shape(shape)) => Outline::of_shape(shape).ok(),
+            _ => None,
+        };
+        Ok(Self { body, neighbours, cells: None, outline, partition: None })
     }
 
     /// A body of whole cells, or of particles alone; one that fits its outline as it is keeps that.
@@ -313,15 +324,21 @@ impl Layout {
             (SceneRegion::Known(region), _) => region.pick(&self.body, &self.neighbours),
             (SceneRegion::Outermost(side), _) => self.outermost(*side),
         };
-        if particles.is_empty() {
-            let (low, high) = self.body.bounds();
-            let message = format!(
-                "no particle of the body lies in this region; the body spans [{}, {}] to [{}, {}]",
-                low[0], low[1], high[0], high[1]
-            );
-            return Err(scene.refuse(&key, message, "move or widen the region"));
+        // Of a part it is nothing wrong if others have them.
+        if particles.is_empty() && self.body.part.is_none() {
+            return Err(self.holds_none(scene, &key));
         }
         Ok(particles)
+    }
+
+    /// The error for the region at `key` if it holds no particle.
+    pub(super) fn holds_none(&self, scene: &Scene, key: &str) -> SceneError {
+        let (low, high) = self.body.bounds();
+        let message = format!(
+            "no particle of the body lies in this region; the body spans [{}, {}] to [{}, {}]",
+            low[0], low[1], high[0], high[1]
+        );
+        scene.refuse(key, message, "move or widen the region")
     }
 
     /// The particles at the outermost coordinate on a side; of a body that has no flat side there, those about half
@@ -465,7 +482,12 @@ fn require_resolved(scene: &Scene, body: &Body) -> Result<(), SceneError> {
     Ok(())
 }
 
-fn refuse_body(scene: &Scene, error: &BodyError) -> SceneError {
+pub(super) fn refuse_pieces(scene: &Scene, error: &BodyError) -> SceneError {
+    let help = "close the gap, use a wider neighbourhood, or run the parts as scenes of their own";
+    scene.refuse("body.shape", error.to_string(), help)
+}
+
+pub(super) fn refuse_body(scene: &Scene, error: &BodyError) -> SceneError {
     let (key, help) = match error {
         BodyError::Alone { .. } => {
             ("neighbours.radius", "use a wider radius, or leave the point out of the file")
@@ -488,6 +510,7 @@ fn check_ids(scene: &Scene, key: &str, region: &SceneRegion, body: &Body) -> Res
         let message = match body.particle(id).map(|i| body.is_frame[i]) {
             Some(false) => continue,
             Some(true) => format!("particle {id} belongs to the frame, whose role is fixed"),
+            None if body.part.is_some() && (1..=body.total()).contains(&id) => continue,
             None => no_particle(id, body),
         };
         let help = match body.numbering {
@@ -505,7 +528,10 @@ fn check_ids(scene: &Scene, key: &str, region: &SceneRegion, body: &Body) -> Res
 /// Message that no particle has this id.
 pub(super) fn no_particle(id: usize, body: &Body) -> String {
     let ids = body.rows().map(|i| body.id(i));
-    let (low, high) = ids.fold((usize::MAX, 0), |(low, high), id| (low.min(id), high.max(id)));
+    let (low, high) = match &body.part {
+        Some(part) => (1, part.total),
+        None => ids.fold((usize::MAX, 0), |(low, high), id| (low.min(id), high.max(id))),
+    };
     format!("there is no particle {id}: ids run from {low} to {high}")
 }
 

@@ -2,7 +2,8 @@
 //!
 //! [`plan::Plan`] lays the scene out as arrays and index lists and says what it makes the program
 //! model; an [`Engine`](crate::engine::Engine) steps them; [`run::run`] is the loop around it.
-//! [`layout`] is the body before any particle moves; [`equilibrium`] goes straight to rest instead of stepping.
+//! [`layout`] is the body before any particle moves, [`parts`] that of ranks each of which has a part of it;
+//! [`equilibrium`] goes straight to rest instead of stepping.
 
 mod active_share;
 pub mod builder;
@@ -16,6 +17,7 @@ pub mod layout;
 pub mod looks;
 pub mod mechanics;
 pub mod memory;
+pub mod parts;
 pub mod places;
 pub mod plan;
 pub mod record;

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::damping::along_outline;
-use super::layout::{Layout, Truth, held_components, no_particle};
+use super::layout::{Layout, Truth, held_components, no_particle, refuse_pieces};
+use super::parts::{Parting, agreed, require_connected};
 use super::{places, weights};
 use crate::engine::setup::{Conduct, RoleChange, Setup};
 use crate::flock::action::{Action, ActionKind};
@@ -19,6 +20,7 @@ use crate::geometry::outline::Outline;
 use crate::material::free_edge::FreeEdge;
 use crate::material::mechanism::require_held;
 use crate::material::outline_loads::{Load, Resultant, sum};
+use crate::ranks::Team;
 use crate::scene::{LoadSteps, Scene, SceneError, Stop};
 use crate::solve::linear::HeldComponent;
 use crate::sweep::{Order, Update};
@@ -62,9 +64,52 @@ impl Plan {
         Self::lay_out(scene, Some(truth))
     }
 
+    /// The part of this rank, planned by all ranks together; for scenes that [`laid_out_whole_for`](super::parts::laid_out_whole_for) has nothing against.
+    ///
+    /// # Errors
+    /// As [`Plan::new`], on all ranks alike.
+    pub fn of_part(scene: &Scene, team: &Team) -> Result<Self, SceneError> {
+        let parting = Parting::among(scene, team)?;
+        let layout = agreed(scene, team, parting.lay_out(scene, team.rank()))?;
+        let connected = require_connected(&layout.body, &layout.neighbours, team);
+        connected.map_err(|error| refuse_pieces(scene, &error))?;
+        let changes = agreed(scene, team, layout.role_changes(scene, None))?;
+        for (k, change) in changes.iter().enumerate() {
+            let owned = layout.body.owned();
+            if !team.any(change.particles.iter().any(|i| owned.contains(i))) {
+                return Err(layout.holds_none(scene, &format!("roles[{k}].region")));
+            }
+        }
+        let mut plan = agreed(scene, team, Self::of_layout(scene, layout, changes))?;
+        plan.agree_on_rest(team);
+        Ok(plan)
+    }
+
+    /// Keeps rest offsets if any particle of the body needs one: those that stand at the ends of a part alone do.
+    fn agree_on_rest(&mut self, team: &Team) {
+        let Setup { body, flock, .. } = &mut self.setup;
+        let is_needed = |rest: &Vectors| body.owned().any(|i| rest.get(i) != [0.0; 2]);
+        let is_needed = team.any(flock.rest.as_ref().is_some_and(is_needed));
+        flock.rest = flock.rest.take().or_else(|| Some(Vectors::zeros(body.count()))).filter(|_| is_needed);
+    }
+
+    /// The part of a rank, planned without the others: what needs them is not checked.
+    ///
+    /// # Errors
+    /// As [`Plan::new`], but for that.
+    pub fn of_part_alone(scene: &Scene, parting: &Parting, rank: usize) -> Result<Self, SceneError> {
+        let layout = parting.lay_out(scene, rank)?;
+        let changes = layout.role_changes(scene, None)?;
+        Self::of_layout(scene, layout, changes)
+    }
+
     fn lay_out(scene: &Scene, truth: Option<Truth<'_>>) -> Result<Self, SceneError> {
         let layout = Layout::new(scene)?;
         let changes = layout.role_changes(scene, truth)?;
+        Self::of_layout(scene, layout, changes)
+    }
+
+    fn of_layout(scene: &Scene, layout: Layout, changes: Vec<RoleChange>) -> Result<Self, SceneError> {
         let following = Following::new(scene, &layout, &changes)?;
         let probes = probes(scene, &layout.body)?;
         places::around(scene, layout.cells.as_ref(), &layout.body.reference)?;

@@ -4,14 +4,14 @@ use std::ops::ControlFlow;
 
 use super::plan::Plan;
 use crate::engine::Engine;
-use crate::engine::movement::{Movement, farthest, first_lost};
+use crate::engine::movement::Movement;
 use crate::engine::observer::{EachStep, Observer};
 use crate::engine::several::Reach;
 use crate::engine::shared::{Agreed, NotShared};
 use crate::engine::state::{EngineState, WrongState};
 use crate::flock::law::Weights;
 use crate::flock::rules::{FeedbackReference, Mean};
-use crate::flock::vectors::{Vectors, distance};
+use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
 use crate::scene::{Scene, SceneError, Stop};
 use crate::solve::equilibrium::Solved;
@@ -336,12 +336,10 @@ pub fn overflow(engine: &Engine) -> Option<Divergence> {
 }
 
 fn divergence(engine: &Engine, movement: &Movement, bound: f64) -> Option<Divergence> {
-    let (present, reference) = (engine.present(), &engine.body().reference);
-    let (particle, what) = if let Some(lost) = (!movement.is_finite).then(|| first_lost(present)).flatten() {
+    let (particle, what) = if let Some(lost) = (!movement.is_finite).then(|| engine.first_lost()).flatten() {
         (lost, "has no finite position any more".to_owned())
     } else if movement.largest_displacement > bound {
-        let far = farthest(present, reference);
-        let apart = distance(present.get(far), reference.get(far));
+        let (far, apart) = engine.farthest();
         let why = if apart > FARTHEST {
             "so far that energies overflow"
         } else {
@@ -351,7 +349,6 @@ fn divergence(engine: &Engine, movement: &Movement, bound: f64) -> Option<Diverg
     } else {
         return None;
     };
-    let particle = engine.body().id(particle);
     Some(Divergence { step: engine.step(), particle, what, likely_cause: likely_cause(engine) })
 }
 

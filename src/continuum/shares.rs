@@ -2,10 +2,12 @@
 
 use super::equilibrium::of_plan;
 use super::memory::{readable_bytes, solving, stepped};
+use super::parts::{Parting, laid_out_whole_for};
 use super::plan::Plan;
 use super::run::require_shareable;
 use crate::engine::setup::Setup;
 use crate::engine::several::looks_at_every_step;
+use crate::flock::body::Part;
 use crate::scene::{Scene, SceneError};
 use crate::solve::corotated::is_corotated;
 use crate::solve::equilibrium::{Request, SolverShares, choose, shared_by};
@@ -54,6 +56,59 @@ pub struct Shares {
     pub exchanged: Exchanged,
     /// Bytes that each rank takes for the body and what steps or solves it; the first one takes more for the results.
     pub bytes: usize,
+}
+
+/// The parts of a body of which each rank lays out one.
+#[derive(Clone, Debug)]
+pub struct PartShares {
+    /// Particles of each rank, shape \[ranks\].
+    pub particles: Vec<usize>,
+    /// Most steps that the rank which has most takes together; 0 where it looks at each.
+    pub steps: usize,
+    /// Bytes that it receives before as many, or in each step.
+    pub halo_bytes: usize,
+    /// What it lays out.
+    pub largest: Plan,
+}
+
+impl PartShares {
+    /// The parts of so many ranks, counted without laying out more than the largest of them; `None` where a key of the scene
+    /// [asks for the whole](laid_out_whole_for).
+    ///
+    /// # Errors
+    /// The body that cannot be laid out.
+    pub fn new(scene: &Scene, ranks: usize) -> Result<Option<Self>, SceneError> {
+        if ranks < 2 || laid_out_whole_for(scene).is_some() {
+            return Ok(None);
+        }
+        let parting = Parting::alone(scene, ranks)?;
+        let rank = parting.largest();
+        let largest = Plan::of_part_alone(scene, &parting, rank)?;
+        let Setup { body, flock, update, roles, .. } = &largest.setup;
+        let part = body.part.as_ref().map(Part::held);
+        let share = Share { rank, ranks, part, ..Share::whole() };
+        let mut sweep = Sweep::compile_share(*update, flock, roles, share);
+        let takes_several = sweep.takes_several(body.frame.as_ref());
+        let (steps, halo) = sweep.domain_mut().map_or((0, 0), |domain| domain.needs(takes_several).most());
+        let (particles, halo_bytes) = (parting.counts(), PLACE * halo);
+        Ok(Some(Self { particles, steps, halo_bytes, largest }))
+    }
+
+    /// For the plan: names and values, with the bytes that the rank takes which takes most.
+    pub fn facts(&self, bytes: usize) -> Vec<(String, String)> {
+        let (least, most) = (self.particles.iter().min(), self.particles.iter().max());
+        let (least, most) = (least.copied().unwrap_or_default(), most.copied().unwrap_or_default());
+        let exchanged = match self.steps {
+            0 => format!("; of others it receives {} bytes in each step", self.halo_bytes),
+            steps => format!("; of others it receives {} bytes before every {steps} steps", self.halo_bytes),
+        };
+        let parts = format!(
+            "with --figures none --no-report each rank lays out and holds its part alone, {least} to {most} particles{exchanged}"
+        );
+        let memory = format!("at most about {} with --figures none --no-report", readable_bytes(bytes));
+        let facts = [("parts", parts), ("memory of a part", memory)];
+        facts.map(|(name, value)| (name.to_owned(), value)).into()
+    }
 }
 
 impl Shares {

@@ -31,7 +31,9 @@ impl Engine {
         let mut changed = false;
         for change in 0..self.changes.len() {
             let taking = self.taking(change);
-            if taking.is_empty() {
+            // The ranks that have no particle of it compile their sweeps with the others.
+            let comes_to_others = self.parted().is_some() && self.changes[change].from == self.step;
+            if taking.is_empty() && !(comes_to_others && self.step > 1) {
                 continue;
             }
             for &which in &taking {

@@ -244,8 +244,7 @@ impl Engine {
 
     /// Sums of PE1 \[length^2\] and PE2 \[length\] over the body, in order of index.
     pub fn energies(&self) -> [f64; 2] {
-        let body = || (0..self.roles.len()).filter(|&i| self.roles[i].is_body());
-        [body().map(|i| self.pe1(i)).sum(), body().map(|i| self.pe2(i)).sum()]
+        self.sum_of_particles(|i| [self.pe1(i), self.pe2(i)])
     }
 
     /// Strain of one particle's surroundings; `None` for a particle that sees too few.
@@ -281,7 +280,7 @@ impl Engine {
         std::mem::swap(&mut self.present, &mut self.previous);
         self.activity.forget();
         // The counts of all ranks are added up.
-        if self.team.as_ref().is_none_or(|(team, _)| team.is_first()) {
+        if self.body.part.is_some() || self.team.as_ref().is_none_or(|(team, _)| team.is_first()) {
             self.activity.count_whole(self.sweep.followers());
         }
     }
@@ -352,8 +351,13 @@ impl Engine {
         self.changes.iter().any(waits)
             || self.next_action().is_some()
             || self.load.is_growing(self.step)
-            || self.leaders.iter().any(|led| self.goes_on(led))
+            || self.any_leader_goes_on()
             || self.moves_components()
+    }
+
+    fn any_leader_goes_on(&self) -> bool {
+        let own = self.leaders.iter().any(|led| self.goes_on(led));
+        self.parted().map_or(own, |team| team.any(own))
     }
 
     /// Looks over the last step.
@@ -393,6 +397,7 @@ impl Engine {
             Sweep::compile_share(self.update, &self.flock, &self.roles, share)
         };
         self.takes_several = self.sweep.takes_several(self.body.frame.as_ref());
+        self.agree_on_needs();
     }
 
     fn break_bonds(&mut self) {

@@ -71,16 +71,16 @@ fn exactly(part: Range<usize>, [present, previous, reference]: [&Vectors; 3], sp
     [largest(previous), largest(reference), f64::from(u8::from(is_lost))]
 }
 
-/// Index of the first particle whose position is not finite.
-pub fn first_lost(present: &Vectors) -> Option<usize> {
-    present.iter().position(|[x, y]| !(x.is_finite() && y.is_finite()))
+/// Index of the first of these particles whose position is not finite.
+pub fn first_lost(present: &Vectors, mut among: Range<usize>) -> Option<usize> {
+    among.find(|&i| !present.get(i).iter().all(|place| place.is_finite()))
 }
 
-/// Index of the particle farthest from its reference place, the first of several.
-pub fn farthest(present: &Vectors, reference: &Vectors) -> usize {
+/// Index of the one of these particles that is farthest from its reference place, the first of several.
+pub fn farthest(present: &Vectors, reference: &Vectors, among: Range<usize>) -> Option<usize> {
     let from_reference = |i: usize| distance(present.get(i), reference.get(i));
     let farther = |best: usize, i: usize| if from_reference(i) > from_reference(best) { i } else { best };
-    (0..present.len()).fold(0, farther)
+    among.reduce(farther)
 }
 
 /// Largest squared distances over the squared spacing; `poison` is not 0 where one is not finite.
@@ -147,7 +147,7 @@ mod tests {
             let movement = Movement::of(&present, &previous, &reference, 2.0);
             assert_eq!(movement.largest_move, 1.5, "at {at}");
             assert!((movement.largest_displacement - 10f64.sqrt() / 2.0).abs() < 1e-15, "at {at}");
-            assert_eq!(farthest(&present, &reference), at);
+            assert_eq!(farthest(&present, &reference, 0..reference.len()), Some(at));
         }
     }
 
@@ -158,7 +158,7 @@ mod tests {
             let mut present = reference.clone();
             present.y[33_333] = value;
             assert!(!Movement::of(&present, &reference, &reference, 1.0).is_finite);
-            assert_eq!(first_lost(&present), Some(33_333));
+            assert_eq!(first_lost(&present, 0..present.len()), Some(33_333));
         }
     }
 

@@ -66,7 +66,8 @@ impl Engine {
             };
             (self.step + 1..=self.step + steps).map(far).fold(0.0, f64::max)
         };
-        self.leaders.iter().map(farthest).fold(0.0, f64::max)
+        let [farthest] = self.largest_of_parts([self.leaders.iter().map(farthest).fold(0.0, f64::max)]);
+        farthest
     }
 
     /// How far from the reference a step can take a particle if before it none is farther than 1, and how far if none has
@@ -75,7 +76,9 @@ impl Engine {
         let reference = &self.body.reference;
         let moved = |j: usize| distance(self.flock.target(j, reference), reference.get(j));
         let gain = self.sweep.gain()?.max(1.0);
-        Some(Reach { gain, offset: self.body.body_particles().map(moved).fold(0.0, f64::max) })
+        let own = self.body.owned().filter(|&i| !self.body.is_frame[i]);
+        let [gain, offset] = self.largest_of_parts([gain, own.map(moved).fold(0.0, f64::max)]);
+        Some(Reach { gain, offset })
     }
 }
 

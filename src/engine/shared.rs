@@ -6,16 +6,22 @@
 //! rank knows all positions and finds the same: bonds that break, neighbours found anew, roles taken on a
 //! condition, frames that look after the sweep, observers. So what a body does hangs on no rank, and its bits on no number
 //! of them.
+//!
+//! A body may be laid out in [parts](crate::flock::body::Part): then each rank has no more than the particles that it moves and
+//! some around them, and to gather is to receive these. What a rank finds, it finds of its own; sums over the whole body go
+//! through the ranks in their order.
 
 use std::ops::{ControlFlow, Range};
 
 use super::Engine;
+use super::movement;
 use super::observer::Observer;
-use crate::flock::vectors::Vectors;
+use crate::flock::body::Part;
+use crate::flock::vectors::{Vectors, distance};
 use crate::ranks::Team;
 use crate::sweep::Order;
 use crate::sweep::caches::Caches;
-use crate::sweep::domain::{Domain, Share};
+use crate::sweep::domain::{Domain, Held, Needs, Share};
 
 /// A sweep that ranks cannot share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -23,7 +29,7 @@ use crate::sweep::domain::{Domain, Share};
 pub struct NotShared;
 
 impl Engine {
-    /// Shares the body with the other ranks from here on. All ranks must have the same engine.
+    /// Shares the body with the other ranks from here on. All ranks must have the same engine, or each that of its part.
     ///
     /// # Errors
     /// A sequential sweep.
@@ -35,7 +41,8 @@ impl Engine {
             return Err(NotShared);
         }
         let caches = agreed_caches(&team);
-        let share = Share { rank: team.rank(), ranks: team.count(), caches };
+        let part = self.body.part.as_ref().map(Part::held);
+        let share = Share { rank: team.rank(), ranks: team.count(), caches, part };
         if !team.is_first() {
             let _ = self.activity.take_counts();
         }
@@ -44,11 +51,20 @@ impl Engine {
         Ok(())
     }
 
-    /// Makes the positions of all particles, now and before the last step, known to all ranks that share the body.
-    /// Every rank must call it at the same step.
+    /// Makes the positions of all particles, now and before the last step, known to all ranks that share the body; of
+    /// a part those of all particles that stand there. Every rank must call it at the same step.
     pub fn gather(&mut self) {
         let (Some((team, _)), Some(domain)) = (&self.team, self.sweep.domain()) else { return };
         if self.is_whole {
+            return;
+        }
+        if self.body.part.is_some() {
+            receive(team, domain, 0, [&mut self.present, &mut self.previous]);
+            self.is_whole = true;
+            let counts = team.sum(self.activity.take_counts());
+            if team.is_first() {
+                self.activity.add_counts(counts);
+            }
             return;
         }
         let of_ranks =
@@ -64,7 +80,10 @@ impl Engine {
     pub(super) fn step_shared(&mut self) {
         self.sweep.step(&self.flock, None, &self.present, &mut self.previous);
         if let (Some((team, _)), Some(domain)) = (&self.team, self.sweep.domain()) {
-            gather_points(team, domain, [&mut self.previous], [0; 2]);
+            match self.body.part {
+                None => drop(gather_points(team, domain, [&mut self.previous], [0; 2])),
+                Some(_) => receive(team, domain, 0, [&mut self.previous]),
+            }
         }
         if let Some(frame) = &self.body.frame {
             frame.follow(&self.flock.reference, &self.present, &mut self.previous);
@@ -73,17 +92,63 @@ impl Engine {
 
     /// Exchanges the particles that must be known for so many steps together.
     pub(super) fn receive_halo(&mut self, steps: usize) {
-        let Some((team, _)) = &self.team else { return };
+        let (Some((team, _)), Some(domain)) = (&self.team, self.sweep.domain()) else { return };
         if !std::mem::replace(&mut self.is_whole, false) {
-            let halo = self.sweep.halo(steps);
-            let sent: Vec<_> =
-                halo.sends.iter().map(|(rank, of)| (*rank, words(&self.present, of))).collect();
-            let sizes: Vec<_> = halo.receives.iter().map(|(rank, of)| (*rank, 2 * of.len())).collect();
-            let received = team.swap(&sent, &sizes);
-            for ((_, of), words) in halo.receives.iter().zip(received) {
-                put(&mut self.present, of, &words);
-            }
+            receive(team, domain, steps, [&mut self.present]);
         }
+    }
+
+    /// Learns what the other ranks move and need; to be called by all of them when the sweep is compiled.
+    pub(super) fn agree_on_needs(&mut self) {
+        let (Some((team, _)), Some(_)) = (&self.team, &self.body.part) else { return };
+        let takes_several = self.takes_several;
+        let Some(domain) = self.sweep.domain_mut() else { return };
+        let own = domain.needs(takes_several).words();
+        domain.learn(team.each(own).iter().map(Needs::of_words).collect());
+        self.takes_several = domain.steps_together() > 0;
+    }
+
+    /// The ranks among which the body is parted: none where each of them, or the only one, has all of it.
+    pub fn parted(&self) -> Option<&Team> {
+        self.body.part.as_ref().and(self.team.as_ref()).map(|(team, _)| team)
+    }
+
+    /// The largest over the parts of the body.
+    pub fn largest_of_parts<const N: usize>(&self, own: [f64; N]) -> [f64; N] {
+        self.parted().map_or(own, |team| team.largest(own))
+    }
+
+    /// The sum of each of some numbers of particles over those of the whole body that belong to it, in order of index.
+    pub(super) fn sum_of_particles<const N: usize>(&self, of: impl Fn(usize) -> [f64; N]) -> [f64; N] {
+        let add = |sums: [u64; N]| {
+            let add = |sums: [f64; N], i: usize| {
+                let own = of(i);
+                std::array::from_fn(|k| sums[k] + own[k])
+            };
+            let body = self.body.owned().filter(|&i| self.roles[i].is_body());
+            body.fold(sums.map(f64::from_bits), add).map(f64::to_bits)
+        };
+        let start = [(-0.0f64).to_bits(); N];
+        self.parted().map_or_else(|| add(start), |team| team.chain(start, add)).map(f64::from_bits)
+    }
+
+    /// The id of the first particle whose position is not finite.
+    pub fn first_lost(&self) -> Option<usize> {
+        let own = movement::first_lost(&self.present, self.body.owned()).map(|i| self.body.id(i));
+        let Some(team) = self.parted() else { return own };
+        let ids = team.each([own.map_or(u64::MAX, |id| id as u64)]).into_iter().flatten().min();
+        ids.filter(|&id| id != u64::MAX).map(|id| id as usize)
+    }
+
+    /// The id of the particle farthest from its reference place, the first of several, and how far it is \[length\].
+    pub fn farthest(&self) -> (usize, f64) {
+        let far = movement::farthest(&self.present, &self.body.reference, self.body.owned());
+        let apart = |far: usize| distance(self.present.get(far), self.body.reference.get(far));
+        let own = far.map_or((0, f64::NEG_INFINITY), |far| (self.body.id(far), apart(far)));
+        let Some(team) = self.parted() else { return own };
+        let all = team.each([own.0 as u64, own.1.to_bits()]);
+        let all = all.into_iter().map(|[id, apart]| (id as usize, f64::from_bits(apart)));
+        all.fold((0, f64::NEG_INFINITY), |most, one| if one.1 > most.1 { one } else { most })
     }
 
     /// For each step, whether it is so on any rank.
@@ -92,6 +157,29 @@ impl Engine {
         let bits = own.iter().enumerate().fold(0, |bits, (k, &own)| bits | u64::from(own) << k);
         let any = team.each([bits]).into_iter().fold(0, |any, [bits]| any | bits);
         (0..own.len()).map(|k| any >> k & 1 == 1).collect()
+    }
+}
+
+/// Receives what is needed of others before so many steps.
+fn receive<const N: usize>(team: &Team, domain: &Domain, steps: usize, mut points: [&mut Vectors; N]) {
+    let halo = domain.halo(steps);
+    let sent = |(rank, of): &(usize, Range<usize>)| {
+        (*rank, points.iter().flat_map(|points| words(points, of)).collect())
+    };
+    let sent: Vec<(usize, Vec<u64>)> = halo.sends.iter().map(sent).collect();
+    let sizes: Vec<_> = halo.receives.iter().map(|(rank, of)| (*rank, 2 * N * of.len())).collect();
+    for ((_, of), words) in halo.receives.iter().zip(team.swap(&sent, &sizes)) {
+        for (points, words) in points.iter_mut().zip(words.chunks_exact(2 * of.len())) {
+            put(points, of, words);
+        }
+    }
+}
+
+impl Part {
+    /// For the sweep, which knows no bodies.
+    pub fn held(&self) -> Held {
+        let ends = |of: &Range<usize>| [of.start, of.end];
+        Held { first: self.first, total: self.total, owned: ends(&self.owned), exact: ends(&self.exact) }
     }
 }
 

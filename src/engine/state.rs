@@ -60,10 +60,12 @@ pub struct WrongState {
 }
 
 impl<'a> EngineState<'a> {
-    /// The state of an engine between two steps.
+    /// The state of an engine between two steps; of a part of a body that of its own particles, which are numbered as in the
+    /// whole body.
     pub fn of(engine: &'a Engine) -> Self {
+        let (owned, first) = (engine.body.owned(), engine.body.part.as_ref().map_or(0, |part| part.first));
         let leading = |&Led { particle, change, which, since, base }: &Led| Leading {
-            particle,
+            particle: first + particle,
             change,
             which,
             since,
@@ -75,12 +77,20 @@ impl<'a> EngineState<'a> {
             all.fold(0, |bits, bond| bits | u8::from(bonds.is_broken(bond)) << (bond % 8))
         };
         let bytes = flock.neighbours.index.len().div_ceil(8);
+        let of = |points: &'a Vectors| match engine.body.part {
+            None => Cow::Borrowed(points),
+            Some(_) => Cow::Owned(Vectors {
+                x: points.x[owned.clone()].to_vec(),
+                y: points.y[owned.clone()].to_vec(),
+            }),
+        };
+        let leaders = engine.leaders.iter().filter(|led| owned.contains(&led.particle));
         Self {
             step: engine.step,
-            present: Cow::Borrowed(&engine.present),
-            previous: Cow::Borrowed(&engine.previous),
-            roles: Cow::Borrowed(&engine.roles),
-            leaders: engine.leaders.iter().map(leading).collect(),
+            present: of(&engine.present),
+            previous: of(&engine.previous),
+            roles: Cow::Borrowed(&engine.roles[owned.clone()]),
+            leaders: leaders.map(leading).collect(),
             guided: Cow::Borrowed(&engine.guided),
             breaks: Cow::Borrowed(&engine.breaks),
             activity: engine.activity.clone(),
@@ -107,6 +117,59 @@ impl<'a> EngineState<'a> {
     /// Steps taken.
     pub fn step(&self) -> usize {
         self.step
+    }
+
+    /// Particles that it is of.
+    pub fn count(&self) -> usize {
+        self.present.len()
+    }
+
+    /// The state of a body, or of a part of one, put together from states of parts; each with the number of its first particle
+    /// in the whole body. They may be more than are needed.
+    ///
+    /// # Errors
+    /// Particles that none of them has.
+    pub fn of_pieces(
+        pieces: &[(usize, EngineState<'_>)],
+        setup: &Setup,
+    ) -> Result<EngineState<'static>, WrongState> {
+        let body = &setup.body;
+        let first = body.part.as_ref().map_or(0, |part| part.first);
+        let exact = body.part.as_ref().map_or(0..body.count(), |part| part.exact.clone());
+        // Those that are there for the others to have neighbours are never looked at.
+        let (mut present, mut roles) = (Vectors::clone(&body.reference), setup.roles.clone());
+        let (mut previous, mut leaders, mut known) = (present.clone(), Vec::new(), 0);
+        for (begin, state) in pieces {
+            let here = |i: usize| (begin + i).checked_sub(first).filter(|i| exact.contains(i));
+            for (i, to) in (0..state.count()).filter_map(|i| Some((i, here(i)?))) {
+                present.set(to, state.present.get(i));
+                previous.set(to, state.previous.get(i));
+                roles[to] = state.roles[i];
+                known += 1;
+            }
+            leaders.extend(state.leaders.iter().filter_map(|led| {
+                let particle = led.particle.checked_sub(first).filter(|i| exact.contains(i))?;
+                let which = setup.changes.get(led.change)?.particles.binary_search(&particle).ok()?;
+                Some(Leading { particle, which, ..*led })
+            }));
+        }
+        if known != exact.len() {
+            return Err(WrongState { what: "particles", found: known, planned: exact.len() });
+        }
+        leaders.sort_unstable_by_key(|led: &Leading| led.particle);
+        let mut activity = pieces.first().map_or_else(Activity::default, |(_, state)| state.activity.clone());
+        activity.forget();
+        Ok(EngineState {
+            step: pieces.first().map_or(0, |(_, state)| state.step),
+            present: Cow::Owned(present),
+            previous: Cow::Owned(previous),
+            roles: Cow::Owned(roles),
+            leaders,
+            guided: Cow::Owned(Vec::new()),
+            breaks: Cow::Owned(Vec::new()),
+            activity,
+            broken: None,
+        })
     }
 
     /// The engine of this plan, in this state.

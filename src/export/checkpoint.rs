@@ -8,6 +8,9 @@
 //! | 4 | CRC-32 of the payload |
 //! | rest | the payload: [`Checkpoint`] in [postcard](https://postcard.jamesmunns.com)'s wire format (numbers \[f64\] as their 8 bytes, little-endian) |
 //!
+//! Where each rank has a part of the body, the others write files of their own first, `checkpoint.STEP.RANK`, which the first
+//! rank's then names.
+//!
 //! It is written beside its place, brought to the disk and then renamed, so that there is always a whole one.
 
 use std::borrow::Cow;
@@ -24,6 +27,7 @@ use super::manifest::create;
 use super::report::AnimationState;
 use crate::continuum::digest::fnv1a;
 use crate::continuum::record::{LoadStep, ProbeSeries, Snapshot};
+use crate::engine::setup::Setup;
 use crate::engine::state::EngineState;
 use crate::scene::Scene;
 
@@ -31,7 +35,7 @@ use crate::scene::Scene;
 pub const FILE: &str = "checkpoint";
 pub(super) const PART: &str = "checkpoint.part";
 const MAGIC: [u8; 8] = *b"FLOCKFRM";
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const HEADER: usize = 24;
 const PROGRAM_VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -60,6 +64,24 @@ pub struct Checkpoint<'a> {
     pub animation: Option<AnimationState<'a>>,
     /// Time taken for the steps so far.
     pub stepping: Duration,
+    /// Where each rank had a part of the body: the number of the first particle of this state in the whole body, and the
+    /// states of the other ranks, in files beside this one. Empty where this state is that of the whole.
+    parts: Parts,
+}
+
+/// See [`Checkpoint::parts`].
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct Parts {
+    first: usize,
+    others: Vec<OtherPart>,
+}
+
+/// The state of another rank.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct OtherPart {
+    file: String,
+    first: usize,
+    count: usize,
 }
 
 /// The records of a run so far.
@@ -182,7 +204,31 @@ impl<'a> Checkpoint<'a> {
             load_steps: Cow::Borrowed(load_steps),
             animation,
             stepping,
+            parts: Parts::default(),
         }
+    }
+
+    /// Writes the state of a rank's part, for the checkpoint of the first rank to name it.
+    pub fn write_part(&self, folder: &Path, rank: usize) -> Result<(), ExportError> {
+        let path = folder.join(part_name(self.engine.step(), rank));
+        let write = || self.write_to(create(&path)?)?.sync_all();
+        write().map_err(ExportError::io("write", &path))
+    }
+
+    /// Takes the place of the former checkpoint when the states of all ranks are on the disk; `firsts` and `counts` are those
+    /// of their particles, shape \[ranks\]. Those of former checkpoints are removed.
+    pub fn write_with_parts(mut self, folder: &Path, parts: &[(usize, usize)]) -> Result<(), ExportError> {
+        let step = self.engine.step();
+        let other = |(rank, &(first, count)): (usize, &(usize, usize))| OtherPart {
+            file: part_name(step, rank),
+            first,
+            count,
+        };
+        self.parts.others = parts.iter().enumerate().skip(1).map(other).collect();
+        self.write(folder)?;
+        let is_named = |name: &str| self.parts.others.iter().any(|other| other.file == name);
+        remove_parts(folder, is_named);
+        Ok(())
     }
 
     /// Takes the place of the former checkpoint in the folder when it is whole on the disk.
@@ -222,7 +268,7 @@ impl<'a> Checkpoint<'a> {
 
     /// A fingerprint of the state that a run goes on from, to distinguish checkpoints: see [`fnv1a`].
     pub fn fingerprint(&self) -> u64 {
-        let state = postcard::to_stdvec(&(&self.engine, self.residual));
+        let state = postcard::to_stdvec(&(&self.engine, self.residual, &self.parts));
         fnv1a(&state.expect("a checkpoint can be written"))
     }
 
@@ -260,6 +306,39 @@ impl Checkpoint<'static> {
             Err(source) if source.kind() == ErrorKind::NotFound => Ok(None),
             Err(source) => Err(CheckpointError::Unreadable { path, source }),
         }
+    }
+
+    /// Puts the state of a body, or of a part of one, together from those of all ranks that the checkpoint names.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is of another step, and a body that it does not fit.
+    pub fn join(&mut self, folder: &Path, setup: &Setup) -> Result<(), CheckpointError> {
+        if self.parts.others.is_empty() && setup.body.part.is_none() {
+            return Ok(());
+        }
+        let Parts { first, others } = std::mem::take(&mut self.parts);
+        let part = setup.body.part.as_ref();
+        let needed = part
+            .map_or(0..setup.body.count(), |part| part.first + part.exact.start..part.first + part.exact.end);
+        let mut pieces = vec![(first, self.engine.clone())];
+        for OtherPart { file, first, count } in others {
+            if first >= needed.end || first + count <= needed.start {
+                continue;
+            }
+            let path = folder.join(file);
+            let bytes = fs::read(&path)
+                .map_err(|source| CheckpointError::Unreadable { path: path.clone(), source })?;
+            let piece = Self::of_bytes(&path, &bytes)?;
+            if (piece.engine.step(), piece.engine.count()) != (self.engine.step(), count) {
+                let what = "it is of another step, or of other particles".to_owned();
+                return Err(CheckpointError::Corrupted { path, what });
+            }
+            pieces.push((first, piece.engine));
+        }
+        let joined = EngineState::of_pieces(&pieces, setup);
+        self.engine = joined
+            .map_err(|error| CheckpointError::Foreign { path: folder.join(FILE), what: error.to_string() })?;
+        Ok(())
     }
 
     fn of_bytes(path: &Path, bytes: &[u8]) -> Result<Self, CheckpointError> {
@@ -337,6 +416,31 @@ pub fn remove(folder: &Path) {
                 tracing::warn!("{} is left in {}: {error}", name, folder.display());
             }
             _ => {}
+        }
+    }
+    remove_parts(folder, |_| false);
+}
+
+/// The name of a rank's part of the checkpoint of a step.
+fn part_name(step: usize, rank: usize) -> String {
+    format!("{FILE}.{step}.{rank}")
+}
+
+/// Whether a file of this name is a rank's part of a checkpoint.
+pub(super) fn is_part(name: &str) -> bool {
+    let numbers = name.strip_prefix(FILE).and_then(|rest| rest.strip_prefix('.'));
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    numbers.and_then(|numbers| numbers.split_once('.')).is_some_and(|(a, b)| is_number(a) && is_number(b))
+}
+
+fn remove_parts(folder: &Path, is_kept: impl Fn(&str) -> bool) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if is_part(&name)
+            && !is_kept(&name)
+            && let Err(error) = fs::remove_file(entry.path())
+        {
+            tracing::warn!("{name} is left in {}: {error}", folder.display());
         }
     }
 }

@@ -6,9 +6,10 @@
 //! `stress_yy`, `stress_xy`) are along x and y under small rotations; of a corotated rule in axes that turn with the
 //! material, which were along x and y in the reference configuration. Numbers are the shortest that read back as the same.
 
+use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
 
-use csv::Writer;
+use csv::{Writer, WriterBuilder};
 use serde::Serialize;
 
 use super::OutputFolder;
@@ -19,6 +20,7 @@ use crate::engine::Engine;
 use crate::flock::body::Body;
 use crate::flock::fracture::Break;
 use crate::material::stress::StressState;
+use crate::ranks::Team;
 
 #[derive(Serialize)]
 struct FinalRow {
@@ -87,14 +89,80 @@ pub fn write_final(
     engine: &Engine,
     stresses: Option<&[Option<StressState>]>,
 ) -> Result<PathBuf, ExportError> {
+    let path = folder.path(FINAL);
+    let write = || write_rows(Writer::from_writer(create(&path)?), final_rows(engine, stresses));
+    write().map_err(ExportError::io("write", &path))?;
+    Ok(path)
+}
+
+/// Writes every particle at the end of a body of which each rank has a part: by all ranks together, into the `folder` of the
+/// first one, which receives the rows of the others in pieces.
+///
+/// # Errors
+/// The first rank's, if the file cannot be written.
+pub fn write_final_of_parts(
+    folder: Option<&OutputFolder>,
+    engine: &Engine,
+    team: &Team,
+) -> Result<(), ExportError> {
+    let rows = || final_rows(engine, None);
+    let Some(folder) = folder else {
+        let mut rows = rows().peekable();
+        while rows.peek().is_some() {
+            let piece = rows.by_ref().take(ROWS_OF_A_PIECE);
+            team.send_bytes(&text_of(piece).unwrap_or_default());
+        }
+        team.send_bytes(&[]);
+        return Ok(());
+    };
+    let path = folder.path(FINAL);
+    let mut file = create(&path).and_then(|file| {
+        let mut file = BufWriter::new(file);
+        write_rows(Writer::from_writer(&mut file), rows()).map(|()| file)
+    });
+    // What the others send is received in any case: they wait until it is.
+    for rank in 1..team.count() {
+        loop {
+            let piece = team.receive_bytes(rank);
+            if piece.is_empty() {
+                break;
+            }
+            file = file.and_then(|mut file| file.write_all(&piece).map(|()| file));
+        }
+    }
+    file.and_then(|mut file| file.flush()).map_err(ExportError::io("write", &path))
+}
+
+const FINAL: &str = "final.csv";
+
+/// Rows that a rank sends at once.
+const ROWS_OF_A_PIECE: usize = 1 << 13;
+
+fn text_of(rows: impl Iterator<Item = FinalRow>) -> io::Result<Vec<u8>> {
+    let mut text = Vec::new();
+    write_rows(WriterBuilder::new().has_headers(false).from_writer(&mut text), rows)?;
+    Ok(text)
+}
+
+fn write_rows(mut writer: Writer<impl Write>, rows: impl Iterator<Item = impl Serialize>) -> io::Result<()> {
+    for row in rows {
+        writer.serialize(row).map_err(io::Error::from)?;
+    }
+    writer.flush()
+}
+
+/// A row for each particle of the body; of a part, for each of its own.
+fn final_rows(engine: &Engine, stresses: Option<&[Option<StressState>]>) -> impl Iterator<Item = FinalRow> {
     let body = engine.body();
-    let stress = |i: usize, k: usize| stresses.map(|all| all[i].map(|stress| stress.components[k]));
-    let of_lattice = |i: usize| body.numbering.is_none() && body.sites[i][0] != Body::ALONG_OUTLINE;
+    let stress = move |i: usize, k: usize| stresses.map(|all| all[i].map(|stress| stress.components[k]));
+    let of_lattice = move |i: usize| body.numbering.is_none() && body.sites[i][0] != Body::ALONG_OUTLINE;
     let at_sites = (0..body.count()).filter(|&i| of_lattice(i)).map(|i| body.sites[i]);
-    let lowest = |axis: usize| at_sites.clone().map(|site| i64::from(site[axis])).min().unwrap_or(0);
-    let (first_column, first_row) = (lowest(0), lowest(1));
+    let lowest = |axis: usize| at_sites.clone().map(|site| site[axis]).min().unwrap_or(0);
+    let lowest = body.part.as_ref().map_or_else(|| [lowest(0), lowest(1)], |part| part.whole.lowest);
+    let [first_column, first_row] = lowest.map(i64::from);
     // Energies and strains are found as they are written: all of them at once would take as much memory as the body.
-    let rows = body.rows().map(|i| (i, engine.strain(i))).map(|(i, strain)| FinalRow {
+    let rows = body.owned().map(|row| body.in_row(row));
+    rows.map(|i| (i, engine.strain(i))).map(move |(i, strain)| FinalRow {
         id: body.id(i),
         column: of_lattice(i).then(|| i64::from(body.sites[i][0]) - first_column + 1),
         row: of_lattice(i).then(|| i64::from(body.sites[i][1]) - first_row + 1),
@@ -113,8 +181,7 @@ pub fn write_final(
         stress_yy: stress(i, 1),
         stress_xy: stress(i, 2),
         von_mises: stresses.map(|all| all[i].map(|stress| stress.von_mises)),
-    });
-    write(folder, "final.csv", rows)
+    })
 }
 
 /// Writes every broken bond in the order they broke: its step (0 for those cut before the first), its
@@ -160,10 +227,7 @@ pub(super) fn write(
     rows: impl Iterator<Item = impl Serialize>,
 ) -> Result<PathBuf, ExportError> {
     let path = folder.path(name);
-    let mut writer = Writer::from_writer(create(&path).map_err(ExportError::io("write", &path))?);
-    for row in rows {
-        writer.serialize(row).map_err(ExportError::io("write", &path))?;
-    }
-    writer.flush().map_err(ExportError::io("write", &path))?;
+    let write = || write_rows(Writer::from_writer(create(&path)?), rows);
+    write().map_err(ExportError::io("write", &path))?;
     Ok(path)
 }

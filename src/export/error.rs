@@ -56,6 +56,17 @@ pub enum ExportError {
         /// The error of the system.
         source: io::Error,
     },
+    /// Another rank cannot write its part.
+    #[error(
+        "rank {rank} cannot write {}\n  help: let --out be a folder that all ranks see, or leave record.vtk_every out",
+        .path.display()
+    )]
+    OnRank {
+        /// The rank.
+        rank: usize,
+        /// The file.
+        path: PathBuf,
+    },
     /// A figure's SVG cannot be drawn as PNG.
     #[error("the figure {} cannot be rendered: {reason}", .path.display())]
     Figure {

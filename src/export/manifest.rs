@@ -18,6 +18,10 @@ pub const FILE: &str = "flockform-files.txt";
 const ALWAYS: [&str; 4] = [FILE, TEMPORARY, checkpoint::FILE, checkpoint::PART];
 const TEMPORARY: &str = "flockform-files.txt.part";
 
+fn is_always_ours(name: &str) -> bool {
+    ALWAYS.contains(&name) || checkpoint::is_part(name)
+}
+
 /// Foreign files that are named; a folder may hold thousands.
 const MOST_NAMED: usize = 5;
 
@@ -49,7 +53,7 @@ impl Written {
     pub fn path(&self, name: &Path) -> PathBuf {
         let mut state = self.state();
         let text = line(name);
-        if !ALWAYS.contains(&&*text) && state.names.insert(text.clone()) {
+        if !is_always_ours(&text) && state.names.insert(text.clone()) {
             // If this cannot be written, the file itself cannot either, and that error is reported.
             let _ = writeln!(state.list, "{text}");
         }
@@ -141,7 +145,7 @@ impl Ours {
             let entry = entry?;
             let (name, kind) = (below.join(entry.file_name()), entry.file_type()?);
             let (text, path) = (line(&name), entry.path());
-            let is_listed = names.contains(&text) || ALWAYS.contains(&&*text);
+            let is_listed = names.contains(&text) || is_always_ours(&text);
             let prefix = format!("{text}/");
             let leads_to_listed =
                 || names.range(prefix.clone()..).next().is_some_and(|n| n.starts_with(&prefix));

@@ -67,6 +67,20 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
     program + RUNNING + stepped(plan) + snapshots + most
 }
 
+/// Bytes that one of so many ranks with a part of a body takes at its largest, by a program whose own code takes so many: there
+/// are no figures and no report, and tables are written row by row.
+pub fn of_part(plan: &Plan, ranks: usize, program: usize) -> usize {
+    /// Memory of MPI, and what it shares with each rank on a machine; measured with Open MPI 4.1.
+    const MPI: [usize; 2] = [4 << 20, 3 << 19];
+    /// Ranks that share a machine's memory, as far as it is known beforehand.
+    const ON_A_MACHINE: usize = 16;
+    /// A particle of others, or for others, before and after a step, on its way.
+    const ON_THE_WAY: usize = 2 * 2 * 16;
+    let [each, of_rank] = MPI;
+    let halo = plan.setup.body.part.as_ref().map_or(0, |part| part.exact.len() - part.owned.len());
+    program + RUNNING + stepped(plan) + each + of_rank * ranks.min(ON_A_MACHINE) + ON_THE_WAY * halo
+}
+
 /// Bytes of what the figures of so many steps are while they are drawn, as many at once as there are threads.
 fn pictures(scene: &Scene, plan: &Plan, moments: usize) -> usize {
     /// Memory of the renderer with its fonts; that of one more at the same time.

@@ -93,6 +93,7 @@ use crate::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use crate::continuum::run::Outcome;
 use crate::engine::Engine;
 use crate::flock::vectors::Vectors;
+use crate::ranks::Team;
 use crate::scene::Scene;
 use crate::scene::units::Units;
 pub use error::ExportError;
@@ -101,7 +102,7 @@ pub use folder::{OutputFolder, unfinished};
 pub use summary::{
     BrokenBonds, Counts, Energies, Equilibrium, FirstBreak, Measured, Seconds, Signed, Summary, Timings,
 };
-pub use vtk::VtkSeries;
+pub use vtk::{VtkSeries, write_piece};
 
 /// The results of a run that are written at its end.
 #[derive(Clone, Copy, Debug)]
@@ -175,10 +176,33 @@ pub fn write_all(
     Ok((written, summary))
 }
 
+/// Writes the table of particles and, last, the summary of a run of which each rank has a part, by all ranks together. The
+/// first one has the `folder`; it alone can fail.
+///
+/// # Errors
+/// The first file that cannot be written.
+pub fn write_all_of_parts(
+    folder: Option<&OutputFolder>,
+    (scene, outcome): (&Scene, &Outcome),
+    mut timings: Timings,
+    team: &Team,
+) -> Result<Summary, ExportError> {
+    let start = Instant::now();
+    let written = csv::write_final_of_parts(folder, &outcome.engine, team);
+    timings.output += start.elapsed();
+    // Sums over all parts: the others wait for this one even if it could not write.
+    let summary = Summary::new(scene, outcome, None, timings);
+    written?;
+    folder.map_or(Ok(()), |folder| summary.write(folder).map(drop))?;
+    Ok(summary)
+}
+
 /// The strain of any particle's surroundings that is largest in size; `None` where no particle sees enough.
 fn largest_strain(engine: &Engine) -> Option<f64> {
     let of = |i: usize| engine.strain(i).map(|strain| strain.largest());
-    (0..engine.body().count()).into_par_iter().filter_map(of).reduce_with(f64::max)
+    let own = engine.body().owned().into_par_iter().filter_map(of).reduce_with(f64::max);
+    let [largest] = engine.largest_of_parts([own.unwrap_or(f64::NEG_INFINITY)]);
+    Some(largest).filter(|&largest| largest > f64::NEG_INFINITY)
 }
 
 /// A figure still to be drawn, and its file without ending.

@@ -11,6 +11,7 @@ use super::error::ExportError;
 use super::figures::chart::{Axis, Chart, Series, Style, draw_below_each_other};
 use super::figures::{self, SERIES};
 use super::summary::write_signed;
+use crate::bench::scale::large::AtRest;
 use crate::bench::scale::model::Link;
 use crate::bench::scale::{Case, Predicted, Report};
 
@@ -70,7 +71,20 @@ pub fn figure(report: &Report) -> String {
         ("As much of a body for each rank", format!("predicted: {each} x {high} particles each")),
         (&report.weak, [|one| one.weak_efficiency, |one| one.weak_efficiency_on_network]),
     );
-    draw_below_each_other(&[strong, weak])
+    let beads = |name: &str, colour: usize, of: fn(&AtRest) -> f64| {
+        let points = report.at_rest.iter().map(|one| [one.ranks as f64, of(one)]).collect();
+        Series::new(name, SERIES[colour], Style::Beads, points)
+    };
+    let at_rest = Chart::new(
+        "An equilibrium by multigrid on more ranks",
+        format!("measured here, ranks are {}", report.ranks_are),
+        [Axis::log("ranks", ""), Axis::new("times as fast as one rank", "")],
+        vec![
+            beads("measured", 0, |one| one.speed_up),
+            beads("as many times as there are ranks", 1, |one| one.ranks as f64),
+        ],
+    );
+    draw_below_each_other(&[strong, weak, at_rest])
 }
 
 type Efficiency = fn(&Predicted) -> f64;

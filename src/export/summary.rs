@@ -220,7 +220,7 @@ pub struct Seconds {
 }
 
 impl Summary {
-    /// The summary of a run that took this long; `measured` is what there is to measure at its end.
+    /// The summary of a run that took this long, made by all ranks together where each has a part of the body; `measured` is what there is to measure at its end.
     pub fn new(scene: &Scene, outcome: &Outcome, measured: Option<Measured>, timings: Timings) -> Self {
         let engine = &outcome.engine;
         let [pe1, pe2] = engine.energies();
@@ -367,16 +367,16 @@ impl Equilibrium {
 }
 
 fn counts(engine: &Engine) -> Counts {
-    let of = |role: Role| engine.roles().iter().filter(|&&r| r == role).count();
-    Counts {
-        particles: engine.roles().len(),
-        followers: of(Role::Follower),
-        leaders: of(Role::Leader),
-        clamped: of(Role::Clamped),
-        ghosts: of(Role::Ghost),
-        frame: of(Role::Frame),
-        neighbour_pairs: bonds::pairs(&engine.flock().neighbours).count(),
-    }
+    let owned = engine.body().owned();
+    let of = |role: Role| engine.roles()[owned.clone()].iter().filter(|&&r| r == role).count();
+    let roles = [Role::Follower, Role::Leader, Role::Clamped, Role::Ghost, Role::Frame].map(of);
+    let own = bonds::pairs(&engine.flock().neighbours).filter(|&[j, _]| owned.contains(&(j as usize)));
+    let [followers, leaders, clamped, ghosts, frame] = roles;
+    let own = [owned.len(), followers, leaders, clamped, ghosts, frame, own.count()];
+    let all =
+        engine.parted().map_or(own, |team| team.sum(own.map(|count| count as u64)).map(|sum| sum as usize));
+    let [particles, followers, leaders, clamped, ghosts, frame, neighbour_pairs] = all;
+    Counts { particles, followers, leaders, clamped, ghosts, frame, neighbour_pairs }
 }
 
 fn broken_bonds(engine: &Engine) -> BrokenBonds {

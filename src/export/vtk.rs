@@ -8,6 +8,10 @@
 //! `von_mises` \[force / length^2\]: of a cell its own, NaN where a bond across it is broken; of a particle that of the
 //! point data; of a bond the mean of its ends.
 //!
+//! Of a body of which each rank has a part every rank writes its piece, `steps/step_000020_0003.vtu`, and
+//! `steps/step_000020.pvtu` lists them. A bond belongs to the piece of the particle that lists it first; its other end, where
+//! that is another piece's, is a point there too, with 1 in `vtkGhostType`.
+//!
 //! Points are in the user's order. Point data: `id`, `role` (0 follower, 1 leader, 2 clamped, 3 frame, 4 ghost),
 //! `displacement` \[length\], `pe1` \[length^2\], `pe2` \[length\], `strain` (xx, yy, xy) \[1\] and `rotation` \[rad\] of a
 //! particle's surroundings, NaN for one that sees too few, and with a material `stress` and `von_mises` as in
@@ -17,6 +21,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -37,8 +42,11 @@ use crate::flock::vectors::{Vectors, distance};
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
 use crate::material::stress::StressState;
+use crate::ranks::Team;
 
 const FOLDER: &str = "steps";
+/// The name by which readers of VTK know points that belong to another piece.
+const GHOSTS: &str = "vtkGhostType";
 const VERTEX: u8 = 1;
 const LINE: u8 = 3;
 const TRIANGLE: u8 = 5;
@@ -49,8 +57,8 @@ const QUADRILATERAL: u8 = 9;
 #[derive(Debug)]
 pub struct VtkSeries {
     files: Arc<Written>,
-    /// Steps that have one.
-    frames: Vec<usize>,
+    /// Steps that have one, and the ranks that wrote it, where these were several.
+    frames: Vec<(usize, Option<usize>)>,
     /// Number of them that are known to be on the disk.
     synced: usize,
     material: Option<Elastic>,
@@ -80,38 +88,60 @@ impl VtkSeries {
     ) -> Result<Self, ExportError> {
         let mut series = Self::create(folder)?;
         for step in steps {
-            let (former, path) = (from.join(frame(step)), series.path(step));
-            if !former.is_file() {
-                return Err(ExportError::MissingFrame(former));
+            let pieces = (0..).take_while(|&rank| from.join(FOLDER).join(piece_name(step, rank)).is_file());
+            let frame = (step, Some(pieces.count()).filter(|&pieces| pieces > 0));
+            for name in names(frame) {
+                let (former, path) = (from.join(&name), series.files.path(&name));
+                if !former.is_file() {
+                    return Err(ExportError::MissingFrame(former));
+                }
+                if former != path {
+                    let copied = fs::read(&former).and_then(|bytes| create(&path)?.write_all(&bytes));
+                    copied.map_err(ExportError::io("copy a frame to", &path))?;
+                }
             }
-            if former != path {
-                let copied = fs::read(&former).and_then(|bytes| create(&path)?.write_all(&bytes));
-                copied.map_err(ExportError::io("copy a frame to", &path))?;
-            }
-            series.frames.push(step);
+            series.frames.push(frame);
         }
         Ok(series)
     }
 
-    /// The present path of a step's frame: a folder may take another name while it is filled.
-    fn path(&self, step: usize) -> PathBuf {
-        self.files.path(&frame(step))
+    /// The present paths of some frames: a folder may take another name while it is filled.
+    fn paths(&self, frames: &[(usize, Option<usize>)]) -> Vec<PathBuf> {
+        frames.iter().flat_map(|&frame| names(frame)).map(|name| self.files.path(&name)).collect()
     }
 
     /// Brings the frames to the disk, so that a checkpoint may count on them.
     pub fn sync(&mut self) -> Result<(), ExportError> {
-        for path in self.frames[self.synced..].iter().map(|&step| self.path(step)) {
+        for path in self.paths(&self.frames[self.synced..]) {
             File::open(&path).and_then(|file| file.sync_all()).map_err(ExportError::io("write", &path))?;
         }
         self.synced = self.frames.len();
         Ok(())
     }
 
-    /// Writes the engine's present state.
+    /// Writes the engine's present state. Of a body of which each rank has a part all ranks write it together, the others by
+    /// [`write_piece`].
+    ///
+    /// # Errors
+    /// A file that cannot be written, by any rank.
     pub fn write(&mut self, engine: &Engine) -> Result<(), ExportError> {
-        let path = self.path(engine.step());
+        if let Some(team) = engine.parted() {
+            return self.write_pieces(engine, team);
+        }
+        let path = self.files.path(&Path::new(FOLDER).join(file_name(engine.step())));
         write_frame(&path, engine, self.material.as_ref()).map_err(ExportError::io("write", &path))?;
-        self.frames.push(engine.step());
+        self.frames.push((engine.step(), None));
+        Ok(())
+    }
+
+    fn write_pieces(&mut self, engine: &Engine, team: &Team) -> Result<(), ExportError> {
+        let step = engine.step();
+        let all = self.paths(&[(step, Some(team.count()))]);
+        let folder = all[0].parent().map(Path::to_owned).unwrap_or_default();
+        team.each_bytes(folder.as_os_str().as_encoded_bytes());
+        write_own_piece(&folder, engine, team)?;
+        write_file(&all[0], list_of_pieces(step, team.count()))?;
+        self.frames.push((step, Some(team.count())));
         Ok(())
     }
 
@@ -122,29 +152,99 @@ impl VtkSeries {
             "<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n",
             "<Collection>\n"
         ));
-        for &step in &self.frames {
-            text += &format!("<DataSet timestep=\"{step}\" file=\"{FOLDER}/{}\"/>\n", file_name(step));
+        for &(step, ranks) in &self.frames {
+            let name = if ranks.is_some() { parted_name } else { file_name };
+            text += &format!("<DataSet timestep=\"{step}\" file=\"{FOLDER}/{}\"/>\n", name(step));
         }
         text += "</Collection>\n</VTKFile>\n";
         let collection = self.files.path(Path::new("steps.pvd"));
         write_file(&collection, text)?;
-        Ok(std::iter::once(collection).chain(self.frames.iter().map(|&step| self.path(step))).collect())
+        Ok(std::iter::once(collection).chain(self.paths(&self.frames)).collect())
     }
 }
 
-fn frame(step: usize) -> PathBuf {
-    Path::new(FOLDER).join(file_name(step))
+/// The files of a frame, below the folder of outputs.
+fn names((step, ranks): (usize, Option<usize>)) -> Vec<PathBuf> {
+    let pieces = (0..ranks.unwrap_or(0)).map(|rank| piece_name(step, rank));
+    let first = if ranks.is_some() { parted_name(step) } else { file_name(step) };
+    std::iter::once(first).chain(pieces).map(|name| Path::new(FOLDER).join(name)).collect()
 }
 
 fn file_name(step: usize) -> String {
     format!("step_{step:06}.vtu")
 }
 
+fn parted_name(step: usize) -> String {
+    format!("step_{step:06}.pvtu")
+}
+
+fn piece_name(step: usize, rank: usize) -> String {
+    format!("step_{step:06}_{rank:04}.vtu")
+}
+
+/// Writes this rank's piece of a frame into the folder of the first rank, which has to be there for all of them; to be called
+/// by all ranks but the first while that one [writes](VtkSeries::write) the frame.
+///
+/// # Errors
+/// A piece that cannot be written, by any rank.
+pub fn write_piece(engine: &Engine, team: &Team) -> Result<(), ExportError> {
+    let folders = team.each_bytes(&[]);
+    let folder = PathBuf::from(String::from_utf8_lossy(&folders[0]).into_owned());
+    write_own_piece(&folder, engine, team)
+}
+
+/// The folder is that of the first rank.
+fn write_own_piece(folder: &Path, engine: &Engine, team: &Team) -> Result<(), ExportError> {
+    let path = folder.join(piece_name(engine.step(), team.rank()));
+    let written = write_frame(&path, engine, None);
+    let failed = team.each([u64::from(written.is_err())]).iter().position(|&[failed]| failed == 1);
+    match (written, failed) {
+        (Err(error), _) => Err(ExportError::io("write", &path)(error)),
+        (Ok(()), Some(rank)) => {
+            Err(ExportError::OnRank { rank, path: folder.join(piece_name(engine.step(), rank)) })
+        }
+        (Ok(()), None) => Ok(()),
+    }
+}
+
+/// What all pieces of a frame have in common, and their names.
+fn list_of_pieces(step: usize, ranks: usize) -> String {
+    let array = |kind: &str, name: &str| format!("<PDataArray type=\"{kind}\" Name=\"{name}\"/>\n");
+    let three = |name: &str, more: &str| {
+        format!("<PDataArray type=\"Float64\" Name=\"{name}\" NumberOfComponents=\"3\"{more}/>\n")
+    };
+    let tensor = " ComponentName0=\"xx\" ComponentName1=\"yy\" ComponentName2=\"xy\"";
+    let points = [
+        array("UInt8", GHOSTS),
+        array("Int64", "id"),
+        array("UInt8", "role"),
+        three("displacement", ""),
+        array("Float64", "pe1"),
+        array("Float64", "pe2"),
+        three("strain", tensor),
+        array("Float64", "rotation"),
+    ];
+    let cells = [array("UInt8", "broken"), array("Float64", "stretch")];
+    let pieces = (0..ranks).map(|rank| format!("<Piece Source=\"{}\"/>\n", piece_name(step, rank)));
+    let attributes =
+        "type=\"PUnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\"";
+    format!(
+        "<?xml version=\"1.0\"?>\n<VTKFile {attributes}>\n<PUnstructuredGrid GhostLevel=\"0\">\n\
+         <PPointData Scalars=\"pe1\" Vectors=\"displacement\">\n{}</PPointData>\n\
+         <PCellData Scalars=\"broken\">\n{}</PCellData>\n<PPoints>\n{}</PPoints>\n{}\
+         </PUnstructuredGrid>\n</VTKFile>\n",
+        points.concat(),
+        cells.concat(),
+        three("Points", ""),
+        pieces.collect::<String>()
+    )
+}
+
 fn write_frame(path: &Path, engine: &Engine, material: Option<&Elastic>) -> io::Result<()> {
     let mut out = create_buffered(path)?;
     let grid = Grid::of(engine);
     let stresses = material.and_then(|elastic| Stresses::at_present(engine, elastic));
-    let points = engine.present().len();
+    let points = grid.points.len();
     writeln!(out, "<?xml version=\"1.0\"?>")?;
     let attributes = "type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\"";
     writeln!(out, "<VTKFile {attributes} header_type=\"UInt64\">")?;
@@ -152,10 +252,11 @@ fn write_frame(path: &Path, engine: &Engine, material: Option<&Elastic>) -> io::
     writeln!(out, "<!-- step {}; role: {roles} -->", engine.step())?;
     writeln!(out, "<UnstructuredGrid>")?;
     writeln!(out, "<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{}\">", grid.count())?;
-    write_point_data(&mut out, engine, stresses.as_ref())?;
+    write_point_data(&mut out, engine, &grid.points, stresses.as_ref())?;
     grid.write_data(&mut out, engine, stresses.as_ref())?;
     writeln!(out, "<Points>")?;
-    let places = engine.body().rows().map(|i| engine.present().get(i)).flat_map(|[x, y]| [x, y, 0.0]);
+    let places = grid.points.clone().map(|row| engine.present().get(engine.body().in_row(row)));
+    let places = places.flat_map(|[x, y]| [x, y, 0.0]);
     vectors(&mut out, "Points", points, places)?;
     writeln!(out, "</Points>")?;
     grid.write(&mut out, engine.body())?;
@@ -163,25 +264,35 @@ fn write_frame(path: &Path, engine: &Engine, material: Option<&Elastic>) -> io::
     out.flush()
 }
 
-fn write_point_data(out: &mut impl Write, engine: &Engine, stresses: Option<&Stresses>) -> io::Result<()> {
-    let (points, body) = (engine.present().len(), engine.body());
+fn write_point_data(
+    out: &mut impl Write,
+    engine: &Engine,
+    rows: &Range<usize>,
+    stresses: Option<&Stresses>,
+) -> io::Result<()> {
+    let (points, body) = (rows.len(), engine.body());
+    let rows = || rows.clone().map(|row| body.in_row(row));
     writeln!(out, "<PointData Scalars=\"pe1\" Vectors=\"displacement\">")?;
-    integers(out, "id", points, body.rows().map(|i| body.id(i) as i64))?;
-    let roles = body.rows().map(|i| engine.roles()[i].number());
+    if body.part.is_some() {
+        // Points of other parts, at the ends of bonds that lead there.
+        bytes(out, GHOSTS, points, rows().map(|i| u8::from(!body.owned().contains(&i))))?;
+    }
+    integers(out, "id", points, rows().map(|i| body.id(i) as i64))?;
+    let roles = rows().map(|i| engine.roles()[i].number());
     bytes(out, "role", points, roles)?;
-    let moved = body.rows().map(|i| (engine.present().get(i), body.reference.get(i)));
+    let moved = rows().map(|i| (engine.present().get(i), body.reference.get(i)));
     let displacement = moved.flat_map(|(now, initial)| [now[0] - initial[0], now[1] - initial[1], 0.0]);
     vectors(out, "displacement", points, displacement)?;
-    floats(out, "pe1", points, body.rows().map(|i| engine.pe1(i)))?;
-    floats(out, "pe2", points, body.rows().map(|i| engine.pe2(i)))?;
-    let strains: Vec<Option<Strain>> =
-        (0..points).into_par_iter().map(|row| engine.strain(body.in_row(row))).collect();
+    floats(out, "pe1", points, rows().map(|i| engine.pe1(i)))?;
+    floats(out, "pe2", points, rows().map(|i| engine.pe2(i)))?;
+    let particles: Vec<usize> = rows().collect();
+    let strains: Vec<Option<Strain>> = particles.into_par_iter().map(|i| engine.strain(i)).collect();
     let components = |strain: &Option<Strain>| strain.map_or([f64::NAN; 3], |strain| strain.components);
     plane_tensors(out, "strain", points, strains.iter().map(components))?;
     let rotation = |strain: &Option<Strain>| strain.map_or(f64::NAN, |strain| strain.rotation);
     floats(out, "rotation", points, strains.iter().map(rotation))?;
     if let Some(stresses) = stresses {
-        write_stresses(out, points, body.rows().map(|i| at_particle(stresses, i)))?;
+        write_stresses(out, points, rows().map(|i| at_particle(stresses, i)))?;
     }
     writeln!(out, "</PointData>")
 }
@@ -205,10 +316,12 @@ fn write_stresses(
     floats(out, "von_mises", count, stresses.map(|stress| stress[3]))
 }
 
-/// The cells of the file, in their order.
+/// The points and the cells of the file, in their order.
 struct Grid<'a> {
-    /// Particles, as vertices: all or none.
-    vertices: usize,
+    /// The rows of the particles that are points: of a part those of others too that bonds of its own lead to.
+    points: Range<usize>,
+    /// The rows of those that are vertices: all of the body or of the part, or none.
+    vertices: Range<usize>,
     /// Bonds, with their places in the neighbours' index list.
     bonds: Vec<(usize, [u32; 2])>,
     polygons: Option<&'a Cells>,
@@ -219,10 +332,14 @@ impl<'a> Grid<'a> {
         let (flock, polygons) = (engine.flock(), engine.cells());
         // Those of a material lie over one another, and none breaks.
         if polygons.is_some() && matches!(flock.weights, Weights::Matrix(_)) {
-            return Self { vertices: 0, bonds: Vec::new(), polygons };
+            return Self { points: 0..engine.present().len(), vertices: 0..0, bonds: Vec::new(), polygons };
         }
-        let bonds = bonds::listed_once(&flock.neighbours).collect();
-        Self { vertices: engine.present().len(), bonds, polygons }
+        let owned = engine.body().owned();
+        let is_own = |(_, [j, _]): &(usize, [u32; 2])| owned.contains(&(*j as usize));
+        let bonds: Vec<_> = bonds::listed_once(&flock.neighbours).filter(is_own).collect();
+        let ends = bonds.iter().flat_map(|(_, pair)| pair).map(|&end| end as usize);
+        let (low, high) = (ends.clone().min().unwrap_or(owned.start), ends.max().map_or(0, |high| high + 1));
+        Self { points: low.min(owned.start)..high.max(owned.end), vertices: owned, bonds, polygons }
     }
 
     fn polygons(&self) -> impl Iterator<Item = &'a [u32]> + Clone {
@@ -230,7 +347,7 @@ impl<'a> Grid<'a> {
     }
 
     fn count(&self) -> usize {
-        self.vertices + self.bonds.len() + self.polygons.map_or(0, Cells::count)
+        self.vertices.len() + self.bonds.len() + self.polygons.map_or(0, Cells::count)
     }
 
     fn write_data(
@@ -249,12 +366,14 @@ impl<'a> Grid<'a> {
         let scalars = if self.bonds.is_empty() && stresses.is_some() { "von_mises" } else { "broken" };
         writeln!(out, "<CellData Scalars=\"{scalars}\">")?;
         let broken = self.bonds.iter().map(|bond| u8::from(is_broken(bond)));
-        let (before, after) = (std::iter::repeat_n(0, self.vertices), std::iter::repeat_n(0, polygons));
+        let vertices = self.vertices.len();
+        let (before, after) = (std::iter::repeat_n(0, vertices), std::iter::repeat_n(0, polygons));
         bytes(out, "broken", cells, before.chain(broken).chain(after))?;
-        let (before, after) = (std::iter::repeat_n(0.0, self.vertices), std::iter::repeat_n(0.0, polygons));
+        let (before, after) = (std::iter::repeat_n(0.0, vertices), std::iter::repeat_n(0.0, polygons));
         floats(out, "stretch", cells, before.chain(self.bonds.iter().map(stretch)).chain(after))?;
         if let Some(stresses) = stresses {
-            let particles = engine.body().rows().take(self.vertices).map(|i| at_particle(stresses, i));
+            let rows = self.vertices.clone().map(|row| engine.body().in_row(row));
+            let particles = rows.map(|i| at_particle(stresses, i));
             let between = |&(_, pair): &(usize, [u32; 2])| {
                 let [a, b] = pair.map(|end| at_particle(stresses, end as usize));
                 std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
@@ -268,14 +387,16 @@ impl<'a> Grid<'a> {
     fn write(&self, out: &mut impl Write, body: &Body) -> io::Result<()> {
         let mut row_of = vec![0; body.count()];
         body.rows().zip(0..).for_each(|(particle, row)| row_of[particle] = row);
-        let row = |&particle: &u32| row_of[particle as usize];
+        let first = self.points.start as i64;
+        let row = |&particle: &u32| row_of[particle as usize] - first;
         let bonds = || self.bonds.iter().flat_map(|(_, pair)| pair);
         let corners = self.polygons.map_or(0, |cells| cells.index.len());
         writeln!(out, "<Cells>")?;
-        let connected =
-            (0..self.vertices as i64).chain(bonds().map(row)).chain(self.polygons().flatten().map(row));
-        integers(out, "connectivity", self.vertices + 2 * self.bonds.len() + corners, connected)?;
-        let sizes = std::iter::repeat_n(1, self.vertices)
+        let vertices = self.vertices.len();
+        let own = self.vertices.clone().map(|row| row as i64 - first);
+        let connected = own.chain(bonds().map(row)).chain(self.polygons().flatten().map(row));
+        integers(out, "connectivity", vertices + 2 * self.bonds.len() + corners, connected)?;
+        let sizes = std::iter::repeat_n(1, vertices)
             .chain(std::iter::repeat_n(2, self.bonds.len()))
             .chain(self.polygons().map(<[u32]>::len));
         let ends = sizes.scan(0, |end, size| {
@@ -288,7 +409,7 @@ impl<'a> Grid<'a> {
             4 => QUADRILATERAL,
             _ => POLYGON,
         };
-        let types = std::iter::repeat_n(VERTEX, self.vertices)
+        let types = std::iter::repeat_n(VERTEX, vertices)
             .chain(std::iter::repeat_n(LINE, self.bonds.len()))
             .chain(self.polygons().map(kind));
         bytes(out, "types", self.count(), types)?;

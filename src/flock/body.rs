@@ -1,5 +1,6 @@
 //! A body: the sites of a lattice inside a shape, numbered, with the frame around them.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::frame::{Frame, FrameRule};
@@ -113,6 +114,75 @@ pub struct Body {
     /// Which particles stand on the outline of the shape that the body was fitted to; of a body of whole cells,
     /// which keeps no outline, nothing.
     pub outline: Option<Arc<OutlineParticles>>,
+    /// The place of these particles in the whole body, where they are not all of it.
+    pub part: Option<Part>,
+}
+
+/// Particles in some columns of a body, by their place in the whole one. Around those that [`Part::owned`] names stand
+/// others, of which those in [`Part::exact`] have the number, the neighbours and the frame that they have in the whole body; the
+/// outermost ones are there for these to be found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// Index of the first particle in the whole body.
+    pub first: usize,
+    /// Particles of the whole body, the frame's included.
+    pub total: usize,
+    /// The particles that belong to this part.
+    pub owned: Range<usize>,
+    /// Those that are as in the whole body, the owned ones among them.
+    pub exact: Range<usize>,
+    /// Of the whole body.
+    pub whole: Extent,
+}
+
+/// The size of a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    /// Bounds without the frame \[length\]; the lower above the higher where there is no particle.
+    pub bounds: ([f64; 2], [f64; 2]),
+    /// Lowest column and row of a particle, the frame's included.
+    pub lowest: Site,
+    /// Most neighbours of a particle.
+    pub neighbours: usize,
+}
+
+impl Extent {
+    /// Of nothing.
+    pub const NONE: Self =
+        Self { bounds: ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]), lowest: [i32::MAX; 2], neighbours: 0 };
+
+    /// Of both.
+    pub fn or(self, other: Self) -> Self {
+        let both = |of: fn(f64, f64) -> f64, a: [f64; 2], b: [f64; 2]| [of(a[0], b[0]), of(a[1], b[1])];
+        let ((low, high), (other_low, other_high)) = (self.bounds, other.bounds);
+        Self {
+            bounds: (both(f64::min, low, other_low), both(f64::max, high, other_high)),
+            lowest: [self.lowest[0].min(other.lowest[0]), self.lowest[1].min(other.lowest[1])],
+            neighbours: self.neighbours.max(other.neighbours),
+        }
+    }
+}
+
+/// The parts of a scene's body that its particles are laid out from.
+#[derive(Clone, Copy, Debug)]
+pub struct Outlay<'a> {
+    /// The lattice that the sites belong to.
+    pub lattice: &'a Lattice,
+    /// The sites that are cut from it.
+    pub cut: &'a Cut,
+    /// Which others a particle sees.
+    pub neighbourhood: &'a Neighbourhood,
+    /// How a frame follows the body, if there is one.
+    pub frame: Option<FrameRule>,
+}
+
+/// The particles of some columns, counted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Census {
+    /// Particles of each column, the frame's included, shape \[columns\].
+    pub counts: Vec<u64>,
+    /// How far they reach.
+    pub extent: Extent,
 }
 
 /// The particles of a body that was fitted to an outline.
@@ -125,8 +195,11 @@ pub struct OutlineParticles {
     pub places: Vec<Option<Place>>,
 }
 
-/// More lattice sites than this are refused before memory is asked for.
+/// More lattice sites than this are refused before memory is asked for, where they are to stand in one process.
 pub const MOST_SITES: u64 = 1 << 28;
+
+/// Columns and rows beyond this one are refused, or sums of two would leave the integers.
+const FARTHEST_SITE: u64 = 1_000_000_000;
 
 /// More neighbour entries than this are refused before memory is asked for: 4 GiB.
 pub const MOST_ENTRIES: u64 = 1 << 30;
@@ -142,17 +215,90 @@ impl Body {
         neighbourhood: &Neighbourhood,
         frame: Option<FrameRule>,
     ) -> Result<(Self, Neighbours), BodyError> {
-        let offsets = neighbourhood.offsets(&lattice)?;
-        let mut shell = offsets.clone();
-        if frame.is_some() {
+        Outlay { lattice: &lattice, cut, neighbourhood, frame }.lay_out(None)
+    }
+}
+
+impl Outlay<'_> {
+    /// The columns that the body may have, its frame's included: the first one, and the one after the last.
+    ///
+    /// # Errors
+    /// A neighbourhood that the lattice does not have, and bounds beyond the integers.
+    pub fn columns(&self) -> Result<Range<i32>, BodyError> {
+        let (low, high) = window(self.lattice, self.cut)?;
+        let margin = self.margin(&self.shell(&self.neighbourhood.offsets(self.lattice)?))[0];
+        Ok(low[0] - margin..high[0] + margin + 1)
+    }
+
+    /// Grid columns to the farthest site that decides on a particle: a neighbour, or a particle that a frame point is for.
+    ///
+    /// # Errors
+    /// A neighbourhood that the lattice does not have.
+    pub fn reach(&self) -> Result<i32, BodyError> {
+        Ok(reach(&self.shell(&self.neighbourhood.offsets(self.lattice)?))[0].max(1))
+    }
+
+    /// Counts the particles of some columns of the body.
+    ///
+    /// # Errors
+    /// As [`Outlay::columns`], and more columns than can be looked at together.
+    pub fn count(&self, columns: Range<i32>) -> Result<Census, BodyError> {
+        let offsets = self.neighbourhood.offsets(self.lattice)?;
+        let far = self.reach()?;
+        let map = self.map(&self.shell(&offsets), Some(columns.start - far..columns.end + far))?;
+        let mut census = Census { counts: vec![0; columns.len()], extent: Extent::NONE };
+        for cell in (0..map.cells.len()).filter(|&cell| map.cells[cell] != NOTHING) {
+            let site = map.window.site(cell);
+            if !columns.contains(&site[0]) {
+                continue;
+            }
+            census.counts[(site[0] - columns.start) as usize] += 1;
+            let mut extent = Extent { lowest: site, ..Extent::NONE };
+            if map.cells[cell] == BODY {
+                let place = self.lattice.position(site);
+                let there = |o: &&Site| map.is_marked([site[0] + o[0], site[1] + o[1]]);
+                let neighbours = offsets[self.lattice.sublattice(site)].iter().filter(there).count();
+                extent = Extent { bounds: (place, place), lowest: site, neighbours };
+            }
+            census.extent = census.extent.or(extent);
+        }
+        Ok(census)
+    }
+
+    /// Everything that a frame is laid around.
+    fn shell(&self, offsets: &[Vec<Site>]) -> Vec<Vec<Site>> {
+        let mut shell = offsets.to_vec();
+        if self.frame.is_some() {
             // The corners of a rectangle touch no edge particle, yet the paper numbers them.
-            let corners = lattice.cell_corners();
+            let corners = self.lattice.cell_corners();
             shell.iter_mut().for_each(|offsets| offsets.extend(&corners));
         }
-        let margin = if frame.is_some() { reach(&shell) } else { [0, 0] };
-        let mut map = SiteMap::cut(&lattice, cut, margin)?;
-        if frame.is_some() {
-            map.mark_frame(&lattice, &shell);
+        shell
+    }
+
+    fn margin(&self, shell: &[Vec<Site>]) -> Site {
+        if self.frame.is_some() { reach(shell) } else { [0, 0] }
+    }
+
+    fn map(&self, shell: &[Vec<Site>], columns: Option<Range<i32>>) -> Result<SiteMap, BodyError> {
+        let mut map = SiteMap::cut(self.lattice, self.cut, self.margin(shell), columns)?;
+        if self.frame.is_some() {
+            map.mark_frame(self.lattice, shell);
+        }
+        Ok(map)
+    }
+
+    /// Lays out the whole body, or what of it stands in some columns, with the neighbours that stand there too.
+    ///
+    /// # Errors
+    /// A whole body without a site, too many sites or neighbours, and a neighbourhood that the lattice does not have.
+    pub fn lay_out(&self, columns: Option<Range<i32>>) -> Result<(Body, Neighbours), BodyError> {
+        let Self { lattice, cut, neighbourhood, frame } = *self;
+        let offsets = neighbourhood.offsets(lattice)?;
+        let is_whole = columns.is_none();
+        let mut map = self.map(&self.shell(&offsets), columns)?;
+        if is_whole && !map.cells.contains(&BODY) {
+            return Err(empty(lattice, cut));
         }
         let (sites, is_frame) = map.number();
         let reference: Arc<Vectors> = Arc::new(sites.iter().map(|&site| lattice.position(site)).collect());
@@ -166,10 +312,15 @@ impl Body {
             let offsets: &[Site] = if is_frame { &[] } else { &offsets[lattice.sublattice(site)] };
             offsets.iter().filter_map(move |offset| map.index([site[0] + offset[0], site[1] + offset[1]]))
         }));
-        let frame = frame.map(|rule| Frame::build(rule, &lattice, &sites, &is_frame, |site| map.index(site)));
-        Ok((Self { lattice, sites, reference, is_frame, frame, numbering: None, outline: None }, neighbours))
+        let frame = frame.map(|rule| Frame::build(rule, lattice, &sites, &is_frame, |site| map.index(site)));
+        let lattice = lattice.clone();
+        let body =
+            Body { lattice, sites, reference, is_frame, frame, numbering: None, outline: None, part: None };
+        Ok((body, neighbours))
     }
+}
 
+impl Body {
     /// Particles that lie on no lattice. Of one they keep the `spacing` \[length\]; their sites are a row, in
     /// their order.
     pub fn of_places(places: Vectors, spacing: f64) -> Self {
@@ -181,12 +332,24 @@ impl Body {
             frame: None,
             numbering: None,
             outline: None,
+            part: None,
         }
     }
 
     /// The id of a particle in files and messages.
     pub fn id(&self, particle: usize) -> usize {
-        self.numbering.as_ref().map_or(particle + 1, |numbering| numbering.id(particle) as usize)
+        let first = self.part.as_ref().map_or(0, |part| part.first);
+        self.numbering.as_ref().map_or(first + particle + 1, |numbering| numbering.id(particle) as usize)
+    }
+
+    /// Particles of the whole body, those of the frame included.
+    pub fn total(&self) -> usize {
+        self.part.as_ref().map_or(self.count(), |part| part.total)
+    }
+
+    /// The particles that belong to this part of the body; all of a whole one.
+    pub fn owned(&self) -> Range<usize> {
+        self.part.as_ref().map_or(0..self.count(), |part| part.owned.clone())
     }
 
     /// The ids of the two ends of a bond, the lower first.
@@ -195,11 +358,12 @@ impl Body {
         [a.min(b), a.max(b)]
     }
 
-    /// The particle that the user calls so.
+    /// The particle that the user calls so, if it stands here.
     pub fn particle(&self, id: usize) -> Option<usize> {
+        let first = self.part.as_ref().map_or(0, |part| part.first);
         match &self.numbering {
             Some(numbering) => numbering.particle(id),
-            None => id.checked_sub(1).filter(|&particle| particle < self.count()),
+            None => id.checked_sub(1 + first).filter(|&particle| particle < self.count()),
         }
     }
 
@@ -213,7 +377,7 @@ impl Body {
         (0..self.count()).map(|row| self.in_row(row))
     }
 
-    /// Number of particles, those of the frame included.
+    /// Number of particles that stand here, those of the frame included.
     pub fn count(&self) -> usize {
         self.sites.len()
     }
@@ -223,8 +387,11 @@ impl Body {
         (0..self.count()).filter(|&i| !self.is_frame[i])
     }
 
-    /// Bounds of the body without its frame \[length\].
+    /// Bounds of the whole body without its frame \[length\].
     pub fn bounds(&self) -> ([f64; 2], [f64; 2]) {
+        if let Some(part) = &self.part {
+            return part.whole.bounds;
+        }
         self.reference.bounds(self.body_particles()).unwrap_or(([0.0; 2], [0.0; 2]))
     }
 
@@ -292,10 +459,21 @@ impl SiteMap {
         }
     }
 
-    fn cut(lattice: &Lattice, cut: &Cut, margin: Site) -> Result<Self, BodyError> {
+    /// Of the whole body, or of some columns.
+    fn cut(
+        lattice: &Lattice,
+        cut: &Cut,
+        margin: Site,
+        columns: Option<Range<i32>>,
+    ) -> Result<Self, BodyError> {
         let (low, high) = window(lattice, cut)?;
         let wider = |site: Site, by: i32| [site[0] + by * margin[0], site[1] + by * margin[1]];
-        let window = Window::new(wider(low, -1), wider(high, 1));
+        let (mut from, mut to) = (wider(low, -1), wider(high, 1));
+        if let Some(columns) = columns {
+            from[0] = from[0].max(columns.start);
+            to[0] = to[0].min(columns.end - 1).max(from[0] - 1);
+        }
+        let window = Window::new(from, to);
         if window.count() > MOST_SITES {
             return Err(BodyError::TooLarge { limit: MOST_SITES });
         }
@@ -321,18 +499,7 @@ impl SiteMap {
                 }
             }
         }
-        if map.cells.contains(&BODY) {
-            return Ok(map);
-        }
-        let (low, high) = match cut {
-            Cut::Shape(shape) => shape.bounds(),
-            Cut::Count { .. } => ([0.0; 2], [0.0; 2]),
-        };
-        Err(BodyError::Empty {
-            spacing: lattice.spacing(),
-            width: high[0] - low[0],
-            height: high[1] - low[1],
-        })
+        Ok(map)
     }
 
     /// Marks every site that a body particle reaches and that is no body particle.
@@ -365,9 +532,22 @@ impl SiteMap {
         (sites, is_frame)
     }
 
+    fn is_marked(&self, site: Site) -> bool {
+        self.window.number(site).is_some_and(|cell| self.cells[cell] != NOTHING)
+    }
+
     fn index(&self, site: Site) -> Option<u32> {
         self.window.number(site).map(|cell| self.cells[cell]).filter(|&index| index != NOTHING)
     }
+}
+
+/// The error for a cut without a site.
+pub fn empty(lattice: &Lattice, cut: &Cut) -> BodyError {
+    let (low, high) = match cut {
+        Cut::Shape(shape) => shape.bounds(),
+        Cut::Count { .. } => ([0.0; 2], [0.0; 2]),
+    };
+    BodyError::Empty { spacing: lattice.spacing(), width: high[0] - low[0], height: high[1] - low[1] }
 }
 
 /// Grid columns from one site of a row to the next.
@@ -379,10 +559,9 @@ fn columns_per_site(lattice: &Lattice) -> u32 {
 fn window(lattice: &Lattice, cut: &Cut) -> Result<(Site, Site), BodyError> {
     match cut {
         Cut::Count { columns, rows } => {
-            let too_large = BodyError::TooLarge { limit: MOST_SITES };
             let across = u64::from(columns_per_site(lattice)) * u64::from(*columns);
-            if across.saturating_mul(u64::from(*rows)) > MOST_SITES {
-                return Err(too_large);
+            if across.max(u64::from(*rows)) > FARTHEST_SITE {
+                return Err(BodyError::TooLarge { limit: MOST_SITES });
             }
             Ok(([0, 0], [across.saturating_sub(1) as i32, rows.saturating_sub(1) as i32]))
         }
@@ -395,9 +574,8 @@ fn window(lattice: &Lattice, cut: &Cut) -> Result<(Site, Site), BodyError> {
             };
             let lows = [0, 1].map(|k| extreme(k, f64::min, f64::INFINITY).floor() - 1.0);
             let highs = [0, 1].map(|k| extreme(k, f64::max, f64::NEG_INFINITY).ceil() + 1.0);
-            let cells = (highs[0] - lows[0] + 1.0) * (highs[1] - lows[1] + 1.0);
-            let in_range = lows.iter().chain(&highs).all(|v| v.abs() < 1e9);
-            if !(in_range && cells <= MOST_SITES as f64) {
+            let in_range = lows.iter().chain(&highs).all(|v| v.abs() <= FARTHEST_SITE as f64);
+            if !in_range {
                 return Err(BodyError::TooLarge { limit: MOST_SITES });
             }
             Ok((lows.map(|v| v as i32), highs.map(|v| v as i32)))

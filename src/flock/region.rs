@@ -58,7 +58,7 @@ impl Region {
         match self {
             Region::All => matter.collect(),
             Region::Edge { side, depth } => {
-                let Some((low, high)) = body.reference.bounds(matter.clone()) else { return Vec::new() };
+                let (low, high) = body.bounds();
                 let depth = depth + tolerance;
                 matter
                     .filter(|&i| match side {
@@ -83,7 +83,8 @@ impl Region {
                 known.filter_map(|(i, place)| place.map(|_| i)).collect()
             }
             Region::Boundary => {
-                let complete = matter.clone().map(|i| neighbours.of(i).len()).max().unwrap_or(0);
+                let most = || matter.clone().map(|i| neighbours.of(i).len()).max().unwrap_or(0);
+                let complete = body.part.as_ref().map_or_else(most, |part| part.whole.neighbours);
                 let lacks = |i: usize| {
                     let seen = neighbours.of(i);
                     seen.len() < complete || seen.iter().any(|&k| body.is_frame[k as usize])

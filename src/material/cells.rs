@@ -379,6 +379,7 @@ pub fn without_loose_sites(body: &Body, neighbours: &Neighbours) -> (Body, Neigh
         frame: None,
         numbering: None,
         outline: None,
+        part: None,
     };
     let seen = |&i: &usize| neighbours.of(i).iter().filter_map(|&j| renumbered[j as usize]);
     (kept, Neighbours::from_lists(keep.iter().map(seen)), cells)

@@ -107,6 +107,58 @@ impl Team {
         std::array::from_fn(largest)
     }
 
+    /// The sum of each of the numbers.
+    pub fn sum<const N: usize>(&self, own: [u64; N]) -> [u64; N] {
+        let all = self.each(own);
+        std::array::from_fn(|k| all.iter().map(|of| of[k]).sum())
+    }
+
+    /// What becomes of the words on their way through all ranks, in the order of the ranks: each makes of them what `work` says
+    /// and hands them on. All ranks have the result.
+    pub fn chain<const N: usize>(
+        &self,
+        start: [u64; N],
+        work: impl FnOnce([u64; N]) -> [u64; N],
+    ) -> [u64; N] {
+        let mut words = start;
+        if let Some(before) = self.rank.checked_sub(1) {
+            let received = self.swap(&[], &[(before, N)]);
+            words = std::array::from_fn(|k| received[0][k]);
+        }
+        words = work(words);
+        if self.rank + 1 < self.count {
+            self.swap(&[(self.rank + 1, words.to_vec())], &[]);
+        }
+        self.each(words).last().copied().unwrap_or(words)
+    }
+
+    /// The bytes of each rank, shape \[ranks\].
+    pub fn each_bytes(&self, own: &[u8]) -> Vec<Vec<u8>> {
+        let lengths: Vec<usize> =
+            self.each([own.len() as u64]).into_iter().map(|[length]| length as usize).collect();
+        let counts: Vec<usize> = lengths.iter().map(|length| length.div_ceil(8)).collect();
+        let all = self.gather(&packed(own), &counts);
+        let mut rest = &all[..];
+        let bytes = |length: &usize| {
+            let (words, after) = rest.split_at(length.div_ceil(8));
+            rest = after;
+            unpacked(words, *length)
+        };
+        lengths.iter().map(bytes).collect()
+    }
+
+    /// Sends bytes to the first rank, which receives them from this one by [`Team::receive_bytes`].
+    pub fn send_bytes(&self, bytes: &[u8]) {
+        self.swap(&[(0, vec![bytes.len() as u64])], &[]);
+        self.swap(&[(0, packed(bytes))], &[]);
+    }
+
+    /// Bytes that a rank sends by [`Team::send_bytes`]; for the first rank.
+    pub fn receive_bytes(&self, from: usize) -> Vec<u8> {
+        let length = self.swap(&[], &[(from, 1)])[0][0] as usize;
+        unpacked(&self.swap(&[], &[(from, length.div_ceil(8))])[0], length)
+    }
+
     /// The first rank whose words differ from the first rank's.
     pub fn first_unlike<const N: usize>(&self, own: [u64; N]) -> Option<usize> {
         let all = self.each(own);
@@ -116,4 +168,17 @@ impl Team {
     fn exchange(&self) -> MutexGuard<'_, dyn Exchange + 'static> {
         self.exchange.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+fn packed(bytes: &[u8]) -> Vec<u64> {
+    let word = |bytes: &[u8]| {
+        let mut word = [0; 8];
+        word[..bytes.len()].copy_from_slice(bytes);
+        u64::from_le_bytes(word)
+    };
+    bytes.chunks(8).map(word).collect()
+}
+
+fn unpacked(words: &[u64], length: usize) -> Vec<u8> {
+    words.iter().flat_map(|word| word.to_le_bytes()).take(length).collect()
 }

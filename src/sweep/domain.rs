@@ -14,7 +14,8 @@ use super::schedule::MOST_STEPS;
 /// rank computes on either side.
 const BANDS_A_STEP: usize = 4;
 
-/// One of several ranks that share a body, and the caches by which it is cut into bands: all ranks must cut it alike.
+/// One of several ranks that share a body, and the caches by which it is cut into bands: where each rank has the whole body,
+/// all must cut it alike.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Share {
     /// The number of this rank, from 0.
@@ -23,26 +24,90 @@ pub struct Share {
     pub ranks: usize,
     /// Of one computer, the same for all ranks.
     pub caches: Caches,
+    /// The part of the body that this rank has, where it has no more.
+    pub part: Option<Held>,
+}
+
+/// Some of a body's particles, as numbers of those that stand here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Held {
+    /// Number of the first particle in the whole body.
+    pub first: usize,
+    /// Particles of the whole body.
+    pub total: usize,
+    /// The first particle that this rank moves, and the one after the last.
+    pub owned: [usize; 2],
+    /// The same of those that see here what they see in the whole body: others are not moved at all.
+    pub exact: [usize; 2],
 }
 
 impl Share {
     /// A body that is not shared, cut for this computer.
     pub fn whole() -> Self {
-        Self { rank: 0, ranks: 1, caches: Caches::here() }
+        Self { rank: 0, ranks: 1, caches: Caches::here(), part: None }
+    }
+
+    /// Particles where a band has to end, ascending; none where it may end anywhere.
+    pub(super) fn cuts(&self) -> Vec<usize> {
+        self.part.map_or_else(Vec::new, |Held { owned: [a, b], exact: [c, d], .. }| vec![c, a, b, d])
     }
 }
 
-/// Shares of the particles, by rank.
+/// Shares of the particles, by rank. Unless it says otherwise, particles are numbered as in the whole body.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Domain {
     rank: usize,
-    /// Where the ranks' parts begin, and where the last one ends, in bands and in particles; shape \[ranks + 1\]. There
-    /// are no bands where the rule has no rows.
-    bands: Option<Vec<usize>>,
-    particles: Vec<usize>,
+    /// Number of the first particle that stands here.
+    first: usize,
+    /// The bands of this rank; none where the rule has no rows.
+    bands: Range<usize>,
+    /// Of all ranks, shape \[ranks\]; of this one alone until [`Domain::learn`] where each has a part of the body.
+    shares: Vec<Needs>,
 }
 
-/// Particles that a rank sends and receives before steps: (rank, particles), at most one stretch for each rank.
+/// What a rank moves and what it needs for that.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Needs {
+    owned: Range<usize>,
+    /// Most steps that it can take together; 0 where it looks at each.
+    steps: usize,
+    /// The particles that it needs for so many steps, its own among them; number 0 is all that it has. Shape
+    /// \[[`MOST_STEPS`] + 1\].
+    needed: Vec<Range<usize>>,
+}
+
+/// Words of [`Needs::words`].
+pub const NEED_WORDS: usize = 3 + 2 * (MOST_STEPS + 1);
+
+impl Needs {
+    fn of(owned: Range<usize>, all: Range<usize>) -> Self {
+        let all = if owned.is_empty() { 0..0 } else { all };
+        Self { owned, steps: 0, needed: vec![all; MOST_STEPS + 1] }
+    }
+
+    /// Most steps together, and how many particles of others they need; of a rank that looks at each step all that it has.
+    pub fn most(&self) -> (usize, usize) {
+        (self.steps, self.needed[self.steps].len() - self.owned.len())
+    }
+
+    /// For another rank.
+    pub fn words(&self) -> [u64; NEED_WORDS] {
+        let ends = |of: &Range<usize>| [of.start as u64, of.end as u64];
+        let own = ends(&self.owned).into_iter().chain([self.steps as u64]);
+        let mut words = own.chain(self.needed.iter().flat_map(ends));
+        std::array::from_fn(|_| words.next().unwrap_or_default())
+    }
+
+    /// Of another rank.
+    pub fn of_words(words: &[u64; NEED_WORDS]) -> Self {
+        let range = |ends: &[u64]| ends[0] as usize..ends[1] as usize;
+        let needed = words[3..].chunks_exact(2).map(range).collect();
+        Self { owned: range(&words[..2]), steps: words[2] as usize, needed }
+    }
+}
+
+/// Particles that a rank sends and receives before steps: (rank, particles that stand here), at most one stretch for each
+/// rank.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Halo {
     /// Particles of this rank that others need.
@@ -52,75 +117,133 @@ pub struct Halo {
 }
 
 impl Domain {
-    /// Parts with about as many followers each.
+    /// Parts with about as many followers each; or the part that is there.
     pub fn of_rows(rows: &Rows, share: Share) -> Self {
-        let costs = (0..rows.band_count()).map(|band| rows.followers(band));
-        let bands = cuts(costs, share.ranks);
-        let begin = |&band: &usize| if band == 0 { 0 } else { rows.particles(band - 1..band).end };
-        let particles = bands.iter().map(begin).collect();
-        Self { rank: share.rank, bands: Some(bands), particles }
+        if let Some(held) = share.part {
+            return Self::of_held_rows(rows, share, held);
+        }
+        let count = rows.band_count();
+        let cuts = cuts((0..count).map(|band| rows.followers(band)), share.ranks);
+        let least = cuts.windows(2).map(|ends| ends[1] - ends[0]).filter(|&bands| bands > 0).min();
+        let needs = |ends: &[usize]| {
+            let of = |bands: Range<usize>| if count == 0 { 0..0 } else { rows.particles(bands) };
+            let mut needs = Needs::of(of(ends[0]..ends[1]), of(0..count));
+            needs.steps = steps_of(least.unwrap_or(0));
+            for steps in (1..=MOST_STEPS).filter(|_| ends[0] < ends[1]) {
+                needs.needed[steps] = of(ends[0].saturating_sub(steps)..(ends[1] + steps).min(count));
+            }
+            needs
+        };
+        let bands = cuts[share.rank]..cuts[share.rank + 1];
+        Self { rank: share.rank, first: 0, bands, shares: cuts.windows(2).map(needs).collect() }
+    }
+
+    fn of_held_rows(rows: &Rows, share: Share, held: Held) -> Self {
+        let mut domain = Self::of_held(share, held);
+        let band_at = |particle: usize| {
+            (0..rows.band_count()).find(|&band| rows.particles(band..band + 1).start >= particle)
+        };
+        let [owned, exact] = [held.owned, held.exact].map(|ends| {
+            let [start, end] = ends.map(|end| band_at(end).unwrap_or(rows.band_count()));
+            start..end
+        });
+        domain.bands = owned.clone();
+        let needs = &mut domain.shares[share.rank];
+        // Beyond the ends of the body there is nothing to be known.
+        let before = if held.first + held.exact[0] == 0 { MOST_STEPS } else { owned.start - exact.start };
+        let ends = held.first + held.exact[1] == held.total;
+        let after = if ends { MOST_STEPS } else { exact.end - owned.end };
+        needs.steps = MOST_STEPS;
+        if !owned.is_empty() {
+            needs.steps = steps_of(owned.len()).min(before).min(after);
+            for steps in 1..=MOST_STEPS {
+                let bands =
+                    owned.start.saturating_sub(steps).max(exact.start)..(owned.end + steps).min(exact.end);
+                let particles = rows.particles(bands);
+                needs.needed[steps] = held.first + particles.start..held.first + particles.end;
+            }
+        }
+        domain
     }
 
     /// The same where the rule has no rows.
     pub fn of_particles(follows: &[bool], share: Share) -> Self {
-        let particles = cuts(follows.iter().map(|&follows| usize::from(follows)), share.ranks);
-        Self { rank: share.rank, bands: None, particles }
+        if let Some(held) = share.part {
+            return Self::of_held(share, held);
+        }
+        let cuts = cuts(follows.iter().map(|&follows| usize::from(follows)), share.ranks);
+        let shares = cuts.windows(2).map(|ends| Needs::of(ends[0]..ends[1], 0..follows.len())).collect();
+        Self { rank: share.rank, first: 0, bands: 0..0, shares }
     }
 
-    /// The particles of this rank.
+    fn of_held(share: Share, held: Held) -> Self {
+        let Held { first, owned, exact, .. } = held;
+        let [owned, exact] = [owned, exact].map(|[start, end]| first + start..first + end);
+        let mut shares = vec![Needs::of(0..0, 0..0); share.ranks];
+        shares[share.rank] = Needs::of(owned, exact);
+        Self { rank: share.rank, first, bands: 0..0, shares }
+    }
+
+    /// What this rank moves and needs, for the others to know.
+    pub fn needs(&mut self, takes_several: bool) -> &Needs {
+        let needs = &mut self.shares[self.rank];
+        if !takes_several {
+            needs.steps = 0;
+        }
+        needs
+    }
+
+    /// Takes in what all ranks move and need.
+    pub fn learn(&mut self, shares: Vec<Needs>) {
+        self.shares = shares;
+    }
+
+    /// The particles of this rank, as numbers of those that stand here.
     pub fn owned(&self) -> Range<usize> {
-        self.of(self.rank)
+        self.here(&self.of(self.rank))
     }
 
     /// The particles of a rank.
     pub fn of(&self, rank: usize) -> Range<usize> {
-        self.particles[rank]..self.particles[rank + 1]
+        self.shares[rank].owned.clone()
+    }
+
+    fn here(&self, of: &Range<usize>) -> Range<usize> {
+        of.start - self.first..of.end - self.first
     }
 
     /// How many particles each rank has, shape \[ranks\].
     pub fn counts(&self) -> Vec<usize> {
-        self.particles.windows(2).map(|ends| ends[1] - ends[0]).collect()
+        self.shares.iter().map(|share| share.owned.len()).collect()
     }
 
     /// The bands of this rank.
     pub fn bands(&self) -> Range<usize> {
-        self.bands.as_ref().map_or(0..0, |cuts| cuts[self.rank]..cuts[self.rank + 1])
+        self.bands.clone()
     }
 
     /// Most steps that are worth taking together: more for larger parts, the same for all ranks.
     pub fn steps_together(&self) -> usize {
-        let sizes = self.bands.iter().flat_map(|cuts| cuts.windows(2)).map(|ends| ends[1] - ends[0]);
-        let least = sizes.filter(|&bands| bands > 0).min().unwrap_or(0);
-        steps_of(least)
+        self.shares.iter().map(|share| share.steps).min().unwrap_or(0)
     }
 
-    /// The exchange before so many steps are taken together.
-    pub fn halo(&self, rows: &Rows, steps: usize) -> Halo {
-        let others = (0..self.counts().len()).filter(|&rank| rank != self.rank);
+    /// The exchange before so many steps are taken together; before 0 steps, of all that a rank has of others.
+    pub fn halo(&self, steps: usize) -> Halo {
+        let others = (0..self.shares.len()).filter(|&rank| rank != self.rank);
         let mut halo = Halo::default();
         for other in others {
-            let sent = meet(&self.needed(other, rows, steps), &self.owned());
-            let received = meet(&self.needed(self.rank, rows, steps), &self.of(other));
-            halo.sends.extend(sent.map(|particles| (other, particles)));
-            halo.receives.extend(received.map(|particles| (other, particles)));
+            let sent = meet(&self.shares[other].needed[steps], &self.of(self.rank));
+            let received = meet(&self.shares[self.rank].needed[steps], &self.of(other));
+            halo.sends.extend(sent.map(|particles| (other, self.here(&particles))));
+            halo.receives.extend(received.map(|particles| (other, self.here(&particles))));
         }
         halo
     }
 
     /// How many particles each rank receives before so many steps, shape \[ranks\].
-    pub fn halo_sizes(&self, rows: &Rows, steps: usize) -> Vec<usize> {
-        let counts = self.counts().into_iter().enumerate();
-        counts.map(|(rank, own)| self.needed(rank, rows, steps).len().saturating_sub(own)).collect()
-    }
-
-    /// The particles that a rank needs in order to take so many steps, its own among them; none if it owns none.
-    fn needed(&self, rank: usize, rows: &Rows, steps: usize) -> Range<usize> {
-        let cuts = self.bands.as_deref().unwrap_or_default();
-        let (Some(&from), Some(&to)) = (cuts.get(rank), cuts.get(rank + 1)) else { return 0..0 };
-        if from == to {
-            return 0..0;
-        }
-        rows.particles(from.saturating_sub(steps)..(to + steps).min(rows.band_count()))
+    pub fn halo_sizes(&self, steps: usize) -> Vec<usize> {
+        let of = |share: &Needs| share.needed[steps].len().saturating_sub(share.owned.len());
+        self.shares.iter().map(of).collect()
     }
 }
 
@@ -136,7 +259,7 @@ fn meet(a: &Range<usize>, b: &Range<usize>) -> Option<Range<usize>> {
 }
 
 /// Where to cut things that cost so much into parts that cost about the same; shape \[parts + 1\].
-fn cuts(costs: impl Iterator<Item = usize> + Clone, parts: usize) -> Vec<usize> {
+pub fn cuts(costs: impl Iterator<Item = usize> + Clone, parts: usize) -> Vec<usize> {
     let total: usize = costs.clone().sum();
     let (mut cuts, mut before, mut count) = (vec![0], 0, 0);
     for cost in costs {
@@ -188,7 +311,7 @@ mod tests {
             let rows = Rows::compile(&flock, &vec![true; count], share(0)).expect("a barycentre");
             let domains: Vec<Domain> = (0..ranks).map(|rank| Domain::of_rows(&rows, share(rank))).collect();
             for steps in [1, 3, 16] {
-                let halos: Vec<Halo> = domains.iter().map(|domain| domain.halo(&rows, steps)).collect();
+                let halos: Vec<Halo> = domains.iter().map(|domain| domain.halo(steps)).collect();
                 for (rank, domain) in domains.iter().enumerate() {
                     let sent = |from: usize| halos[from].sends.iter().filter(|(to, _)| *to == rank);
                     let sent: Vec<_> = (0..ranks)
@@ -196,7 +319,7 @@ mod tests {
                         .collect();
                     assert_eq!(halos[rank].receives, sent, "rank {rank} of {ranks}, {steps} steps");
                     let received: usize = sent.iter().map(|(_, of)| of.len()).sum();
-                    assert_eq!(received, domain.halo_sizes(&rows, steps)[rank]);
+                    assert_eq!(received, domain.halo_sizes(steps)[rank]);
                     assert_eq!(received == 0, domain.owned().is_empty(), "rank {rank} of {ranks}");
                 }
             }

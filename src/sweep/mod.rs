@@ -36,7 +36,7 @@ use crate::flock::law::{Flock, Weights};
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
 use caches::Caches;
-use domain::{Domain, Halo, Share};
+use domain::{Domain, Halo, Held, Share};
 use kernel::Component;
 use rows::Rows;
 use terms::Compiled;
@@ -140,6 +140,9 @@ impl Sweep {
     /// Leaves to the other ranks what is theirs; to be called before anything is swept. A sequential sweep cannot be
     /// shared: each particle waits for the one before it.
     pub fn share_with(&mut self, share: Share) {
+        if let Some(Held { owned: [start, end], .. }) = share.part {
+            self.followers = self.follows[start..end].iter().filter(|&&follows| follows).count();
+        }
         self.domain = (share.ranks > 1).then(|| match &self.rows {
             Some(rows) => Domain::of_rows(rows, share),
             None => Domain::of_particles(&self.follows, share),
@@ -151,20 +154,19 @@ impl Sweep {
         self.domain.as_ref()
     }
 
+    /// The same, for what is to be learned of the other ranks.
+    pub fn domain_mut(&mut self) -> Option<&mut Domain> {
+        self.domain.as_mut()
+    }
+
     /// The exchange of ranks before they take so many steps together; empty where the body is not shared.
     pub fn halo(&self, steps: usize) -> Halo {
-        match (&self.domain, &self.rows) {
-            (Some(domain), Some(rows)) => domain.halo(rows, steps),
-            _ => Halo::default(),
-        }
+        self.domain.as_ref().map_or_else(Halo::default, |domain| domain.halo(steps))
     }
 
     /// How many particles each rank receives before so many steps, shape \[ranks\]; nothing where the body is not shared.
     pub fn halo_sizes(&self, steps: usize) -> Vec<usize> {
-        match (&self.domain, &self.rows) {
-            (Some(domain), Some(rows)) => domain.halo_sizes(rows, steps),
-            _ => Vec::new(),
-        }
+        self.domain.as_ref().map_or_else(Vec::new, |domain| domain.halo_sizes(steps))
     }
 
     /// Most steps that are worth taking together.
@@ -275,7 +277,7 @@ impl Sweep {
         farther
     }
 
-    /// How many particles follow.
+    /// How many particles follow; of a part of a body, of its own.
     pub fn followers(&self) -> usize {
         self.followers
     }

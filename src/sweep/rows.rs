@@ -169,9 +169,9 @@ impl Rows {
     ) -> Self {
         let reach = reach(neighbours, follows);
         self.is_local = reach <= LARGEST_BAND / 3;
-        let (caches, smallest) = (share.caches, smallest_band(follows.len(), share.ranks));
-        self.is_in_cache = follows.len() <= caches.whole_body;
-        self.band_size = if self.is_local { band_size(reach, caches).max(smallest) } else { LARGEST_BAND };
+        let total = share.part.map_or(follows.len(), |held| held.total);
+        self.is_in_cache = follows.len() <= share.caches.whole_body;
+        self.band_size = if self.is_local { usual_band(reach, total, share) } else { LARGEST_BAND };
         let size = self.band_size;
         let is_in_cache = self.is_in_cache;
         let is_alike = |j: usize, k: usize| {
@@ -188,9 +188,12 @@ impl Rows {
         };
         let mut j = 0;
         let mut listed = Vec::new();
+        let mut cuts = share.cuts().into_iter().filter(|&cut| (1..follows.len()).contains(&cut)).peekable();
         self.open_band(0);
         while j < follows.len() {
-            let end = (j + size).min(follows.len());
+            while cuts.next_if(|&cut| cut <= j).is_some() {}
+            let cut = cuts.peek().copied();
+            let end = (j + size).min(cut.unwrap_or(follows.len()));
             let same = |&k: &usize| !(follows[j] && is_alike(j, k));
             let len = (j + 1..end).find(same).unwrap_or(end) - j;
             let weighs = follows[j] && weighs(neighbours, j, source);
@@ -203,7 +206,9 @@ impl Rows {
             }
             j += len;
             let begin = self.bands.last().map_or(0, |band| band.particle as usize);
-            if j - begin >= size && j < follows.len() {
+            // A band that ends before a cut leaves a whole one to it, or particles would see past what is left.
+            let is_full = j - begin >= size && cut.is_none_or(|cut| cut >= j + size);
+            if (is_full && j < follows.len()) || (Some(j) == cut && j > begin) {
                 self.close_band(neighbours, &listed, source);
                 listed.clear();
                 self.open_band(j);
@@ -216,6 +221,10 @@ impl Rows {
             self.bands[band].followers = count as u32;
             self.followers += count;
         }
+        // Those at the ends of what is here are seen from one side alone.
+        let inner = 1..self.band_count().saturating_sub(1);
+        self.is_local &= share.part.is_none()
+            || inner.into_iter().all(|band| self.particles(band..band + 1).len() >= reach);
         self
     }
 
@@ -395,6 +404,11 @@ fn band_size(reach: usize, caches: Caches) -> usize {
         // In a front that no cache holds, columns abreast serve each other.
         _ => three,
     }
+}
+
+/// Fewest particles in a band, but for the last, of a body of so many whose particles see so far.
+pub fn usual_band(reach: usize, total: usize, share: Share) -> usize {
+    band_size(reach, share.caches).max(smallest_band(total, share.ranks))
 }
 
 /// Fewest particles in a band of a body of so many, shared by so many ranks.

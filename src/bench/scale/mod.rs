@@ -2,10 +2,13 @@
 //!
 //! * **strong**: the same body on more ranks. **weak**: as many columns for each rank. Both take turns with one rank alone,
 //!   and every rank has one thread. Without a launcher ranks are threads of this process; under `mpirun` they are processes.
+//! * **at rest**: one equilibrium, by multigrid on ranks and on one. **large**, if asked for: that of 1056 by 1056 cells, and
+//!   sweeps of 4096 by 4096 particles beside as many threads of one process.
 //! * **counted**: messages, bytes and updates of small bodies on up to 64 ranks, beside those of the [`model`].
 //! * **predicted**: the model with the cost of an update and of a message as they were measured here, and with the messages of
 //!   a network that is assumed.
 
+pub mod large;
 pub mod model;
 mod ranks;
 mod table;
@@ -15,6 +18,7 @@ use std::thread::available_parallelism;
 use rayon::ThreadPoolBuildError;
 use serde::Serialize;
 
+use self::large::{AtRest, BesideThreads};
 use self::model::{Grid, Link, Model};
 use self::ranks::{Tally, on_threads};
 use super::grid::plan;
@@ -29,6 +33,8 @@ pub struct Options {
     pub quick: bool,
     /// Most ranks that are timed where they are threads; as many as there are cores, at most eight, unless given.
     pub ranks: Option<usize>,
+    /// Two ranks, or those of the team, on large bodies as well, which take several GB and minutes.
+    pub large: bool,
 }
 
 /// The amount of work that [`Options`] stand for.
@@ -41,11 +47,20 @@ struct Effort {
     turns: (usize, f64),
     /// Messages by which a link is measured.
     messages: usize,
+    /// The plate that comes to rest on each number of ranks.
+    at_rest: large::Effort,
 }
 
-const FULL: Effort = Effort { strong: [1536, 1536], weak: [1024, 1024], turns: (9, 0.25), messages: 401 };
+const FULL: Effort = Effort {
+    strong: [1536, 1536],
+    weak: [1024, 1024],
+    turns: (9, 0.25),
+    messages: 401,
+    at_rest: large::Effort { solved: 400, turns: 5, ..large::FULL },
+};
 
-const QUICK: Effort = Effort { strong: [96, 64], weak: [48, 64], turns: (3, 1e-3), messages: 11 };
+const QUICK: Effort =
+    Effort { strong: [96, 64], weak: [48, 64], turns: (3, 1e-3), messages: 11, at_rest: large::QUICK };
 
 /// Ranks on which is counted.
 const COUNTED: [usize; 7] = [1, 2, 4, 8, 16, 32, 64];
@@ -77,6 +92,10 @@ pub struct Report {
     pub strong: Vec<Case>,
     /// As much of a body for each rank.
     pub weak: Vec<Case>,
+    /// One equilibrium on more ranks.
+    pub at_rest: Vec<AtRest>,
+    /// Sweeps of a large body beside threads, where they were asked for.
+    pub beside_threads: Vec<BesideThreads>,
     /// Counts of small bodies, beside the model's.
     pub counted: Vec<Counted>,
     /// The body of `strong_efficiency` in what is predicted: columns, rows.
@@ -157,11 +176,19 @@ pub fn run(options: &Options, team: Option<&Team>) -> Result<Report, ThreadPoolB
     counts.push(most);
     let link = |team: &Team| ranks::link(team, effort.messages);
     let link = team.map_or_else(|| on_threads(2, link), |team| Ok(link(team)))?;
-    let (mut strong, mut weak) = (Vec::new(), Vec::new());
+    let (mut strong, mut weak, mut at_rest) = (Vec::new(), Vec::new(), Vec::new());
     for ranks in team.map_or(counts, |team| vec![team.count()]) {
         strong.push(measured(effort, [effort.strong; 2], ranks, team)?);
         let [columns, rows] = effort.weak;
         weak.push(measured(effort, [effort.weak, [columns * ranks, rows]], ranks, team)?);
+        at_rest.push(large::at_rest(&effort.at_rest, ranks, team)?);
+    }
+    let mut beside_threads = Vec::new();
+    if options.large {
+        let (sizes, ranks) =
+            (if options.quick { &large::QUICK } else { &large::FULL }, team.map_or(2, Team::count));
+        beside_threads = large::beside_threads(sizes, ranks, team)?;
+        at_rest.push(large::at_rest(sizes, ranks, team)?);
     }
     let model = Model { update_seconds: update_seconds(&weak), link };
     for case in strong.iter_mut().chain(&mut weak) {
@@ -177,6 +204,8 @@ pub fn run(options: &Options, team: Option<&Team>) -> Result<Report, ThreadPoolB
         model,
         strong,
         weak,
+        at_rest,
+        beside_threads,
         counted,
         predicted_body: LARGE,
         predicted_part: LARGE_EACH,
@@ -253,6 +282,7 @@ impl Predicted {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sweep::MOST_STEPS;
 
     #[test]
     fn what_is_exchanged_is_what_the_model_says_up_to_64_ranks() {
@@ -268,7 +298,14 @@ mod tests {
 
     #[test]
     fn a_quick_run_measures_all_and_says_what_is_predicted() {
-        let report = run(&Options { quick: true, ranks: Some(3) }, None).expect("threads");
+        let options = Options { quick: true, ranks: Some(3), large: true };
+        let report = run(&options, None).expect("threads");
+        assert_eq!(report.at_rest.iter().map(|one| one.ranks).collect::<Vec<_>>(), [2, 3, 2]);
+        assert!(
+            report.at_rest.iter().all(|one| one.iterations == one.alone_iterations && one.speed_up > 0.0)
+        );
+        let together: Vec<usize> = report.beside_threads.iter().map(|one| one.steps_together).collect();
+        assert_eq!(together, [1, MOST_STEPS]);
         let ranks: Vec<usize> = report.strong.iter().map(|case| case.ranks).collect();
         assert_eq!(ranks, [2, 3]);
         for case in report.strong.iter().chain(&report.weak) {

@@ -95,21 +95,22 @@ pub fn single() -> Result<ThreadPool, ThreadPoolBuildError> {
 pub fn time(team: &Team, [alone, shared]: [&Plan; 2], (repetitions, seconds): (usize, f64)) -> Times {
     let tally = Arc::new(Mutex::new(Tally::default()));
     let mut whole = team.is_first().then(|| engine(alone, None));
-    let mut parts = engine(shared, Some(Counted { team: team.clone(), tally: Arc::clone(&tally) }));
+    let counted = Counted { team: team.clone(), tally: Arc::clone(&tally) };
+    let mut parts = engine(shared, Some(Team::new(counted)));
     let steps = whole.as_mut().map_or(0, |whole| {
-        step(whole, MOST_STEPS);
+        step(whole, MOST_STEPS, MOST_STEPS);
         let one = timed(whole, MOST_STEPS);
         ((seconds / one).clamp(1.0, 1e5) as u64).next_multiple_of(MOST_STEPS as u64)
     });
     let [steps] = team.of_first([steps]);
-    step(&mut parts, MOST_STEPS);
+    step(&mut parts, MOST_STEPS, MOST_STEPS);
     let (mut of_one, mut of_all, mut waited) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..repetitions {
         of_one.extend(whole.as_mut().map(|whole| timed(whole, steps as usize)));
         *held(&tally) = Tally::default();
         team.any(false);
         let begin = Instant::now();
-        step(&mut parts, steps as usize);
+        step(&mut parts, steps as usize, MOST_STEPS);
         let own = held(&tally).seconds / begin.elapsed().as_secs_f64();
         let [longest] = team.largest([own]);
         of_all.push(begin.elapsed().as_secs_f64() / steps as f64);
@@ -121,13 +122,14 @@ pub fn time(team: &Team, [alone, shared]: [&Plan; 2], (repetitions, seconds): (u
 /// Data that the rank with most messages receives in so many steps, and the followers of the busiest one.
 pub fn count(team: &Team, plan: &Plan, steps: usize) -> (Tally, u64) {
     let tally = Arc::new(Mutex::new(Tally::default()));
-    let mut engine = engine(plan, Some(Counted { team: team.clone(), tally: Arc::clone(&tally) }));
+    let counted = Counted { team: team.clone(), tally: Arc::clone(&tally) };
+    let mut engine = engine(plan, Some(Team::new(counted)));
     // The first steps begin where everybody knows everything.
-    step(&mut engine, MOST_STEPS);
+    step(&mut engine, MOST_STEPS, MOST_STEPS);
     let counted = |engine: &Engine| engine.activity().clone().take_counts()[0];
     let before = counted(&engine);
     *held(&tally) = Tally::default();
-    step(&mut engine, steps);
+    step(&mut engine, steps, MOST_STEPS);
     let Tally { messages, bytes, .. } = *held(&tally);
     let updates = (counted(&engine) - before) / 2;
     let all = team.each([messages, bytes, updates]);
@@ -157,21 +159,22 @@ fn swapped(team: &Team, other: usize, words: usize) -> f64 {
     begin.elapsed().as_secs_f64()
 }
 
-fn engine(plan: &Plan, rank: Option<Counted>) -> Engine {
+/// A stirred body, or a rank's share of it.
+pub fn engine(plan: &Plan, team: Option<Team>) -> Engine {
     let mut engine = Engine::new(plan.setup.clone());
     let reference = engine.body().reference.clone();
     engine.observe(stirred(&reference).enumerate());
-    if let Some(rank) = rank {
-        engine.join(Team::new(rank)).expect("a synchronous sweep");
+    if let Some(team) = team {
+        engine.join(team).expect("a synchronous sweep");
     }
     engine
 }
 
-/// Takes steps, as many together as pay.
-fn step(engine: &mut Engine, steps: usize) {
+/// Takes steps, as many together as pay and at most `most`.
+pub fn step(engine: &mut Engine, steps: usize, most: usize) {
     let mut to_go = steps;
     while to_go > 0 {
-        let together = engine.steps_at_once(to_go);
+        let together = engine.steps_at_once(to_go.min(most));
         if together == 0 {
             engine.advance();
         } else {
@@ -183,6 +186,6 @@ fn step(engine: &mut Engine, steps: usize) {
 
 fn timed(engine: &mut Engine, steps: usize) -> f64 {
     let begin = Instant::now();
-    step(engine, steps);
+    step(engine, steps, MOST_STEPS);
     begin.elapsed().as_secs_f64() / steps as f64
 }

@@ -19,6 +19,7 @@ impl fmt::Display for Report {
         )?;
         cases(f, "strong: the same body", &self.strong)?;
         cases(f, "weak: as much for each rank", &self.weak)?;
+        self.equilibria(f)?;
         self.counts(f)?;
         self.predicted(f)?;
         if self.strong.iter().any(|case| case.ranks > self.cores) && self.ranks_are == "threads" {
@@ -58,6 +59,40 @@ fn milliseconds(seconds: f64) -> String {
 }
 
 impl Report {
+    fn equilibria(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "\n{:<28} {:>14} {:>12} {:>12} {:>10} {:>12}",
+            "at rest, by multigrid", "body", "one rank", "a solve", "times", "iterations"
+        )?;
+        for case in &self.at_rest {
+            writeln!(
+                f,
+                "{:<28} {:>14} {:>12} {:>12} {:>10.2} {:>12}",
+                format!("{} ranks", case.ranks),
+                format!("{} x {}", case.body[0], case.body[1]),
+                milliseconds(case.alone_seconds),
+                milliseconds(case.seconds),
+                case.speed_up,
+                format!("{} ({})", case.iterations, case.alone_iterations),
+            )?;
+        }
+        for case in &self.beside_threads {
+            writeln!(
+                f,
+                "{} ranks beside as many threads, {} x {}, at most {} steps together: {} a step, threads {}, {:.2} times",
+                case.ranks,
+                case.body[0],
+                case.body[1],
+                case.steps_together,
+                milliseconds(case.seconds_per_step),
+                milliseconds(case.threads_seconds_per_step),
+                case.ratio,
+            )?;
+        }
+        Ok(())
+    }
+
     fn counts(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,

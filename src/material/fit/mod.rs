@@ -304,6 +304,7 @@ impl Assembly<'_> {
             frame: None,
             numbering: None,
             outline: Some(Arc::new(OutlineParticles { regular, places })),
+            part: None,
         };
         Fitted { body, cells }
     }

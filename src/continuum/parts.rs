@@ -1,0 +1,325 @@
+//! A body of which each rank lays out a part, and none the whole.
+//!
+//! A part is some columns of the lattice ([`Part`]). Before anything is laid out the ranks count the particles of the columns,
+//! each those of as many; the counts say where the body is cut, and which number a particle has in the whole. Each rank then
+//! lays out the columns that are its own, as many around them as its halos take, and a few more for these to have their
+//! neighbours: what it has is a body like any other. The checks that need the whole are made together, and what one rank
+//! refuses all refuse.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+use super::layout::{Layout, refuse_body};
+use crate::flock::body::{Body, BodyError, Census, Extent, Outlay, Part, empty};
+use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
+use crate::flock::role::Role;
+use crate::flock::rules::Mean;
+use crate::geometry::disjoint_sets::DisjointSets;
+use crate::ranks::Team;
+use crate::scene::{BodySource, LeaderMotion, RoleEntry, Scene, SceneError, SceneRegion, Weights};
+use crate::sweep::Order;
+use crate::sweep::caches::Caches;
+use crate::sweep::domain::{Share, cuts, steps_of};
+use crate::sweep::rows::usual_band;
+
+/// The key for which a scene has to be laid out as a whole, on every rank; `None` where each can lay out its part.
+pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
+    let record = &scene.record;
+    let weights = matches!(scene.weights, Some(Weights::Solved | Weights::Gradient { .. }));
+    let keys: [(bool, &str); 14] = [
+        (!matches!(scene.body, BodySource::Cut(_)), "body.shape"),
+        (scene.is_fitted, "body.outline"),
+        (matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. }), "neighbours.kind"),
+        (scene.material.is_some(), "material"),
+        (matches!(scene.mean, Mean::Material { .. }), "rule.mean"),
+        (weights, "rule.weights"),
+        (scene.update.order == Order::Sequential, "update.order"),
+        (scene.equilibrium.is_some(), "equilibrium"),
+        (scene.load_steps.is_some(), "load_steps"),
+        (!scene.loads.is_empty(), "loads"),
+        (scene.fracture.is_some(), "fracture"),
+        (!scene.cuts.is_empty(), "cuts"),
+        (!scene.actions.is_empty(), "actions"),
+        (!record.probes.is_empty(), "record.probes"),
+    ];
+    let of_role = |(k, entry): (usize, &RoleEntry)| {
+        let RoleEntry { region, role, axis, when, motion, .. } = entry;
+        let is_simple = matches!(motion, None | Some(LeaderMotion::Program(_)));
+        let keys = [
+            (matches!(region, SceneRegion::Outline(_)), "region"),
+            (*role == Role::Ghost, "role"),
+            (axis.is_some(), "axis"),
+            (when.is_some(), "when"),
+            (!is_simple, "motion"),
+        ];
+        let found = keys.into_iter().find(|(is, _)| *is);
+        found.map(|(_, key)| format!("roles[{k}].{key}"))
+    };
+    let key = keys.into_iter().find(|(is, _)| *is).map(|(_, key)| key.to_owned());
+    key.or_else(|| scene.roles.iter().enumerate().find_map(of_role))
+}
+
+/// Which columns of a body are whose.
+#[derive(Clone, Debug)]
+pub struct Parting {
+    /// The first column, and the one after the last.
+    columns: Range<i32>,
+    /// Particles before each column, and in all; shape \[columns + 1\].
+    before: Vec<u64>,
+    extent: Extent,
+    /// Columns around a particle that decide on it.
+    reach: i32,
+    /// Where the parts begin, and where the last one ends: numbers of columns, shape \[ranks + 1\].
+    cuts: Vec<usize>,
+    /// Particles of a halo on either side.
+    halo: u64,
+}
+
+/// Most columns that are counted at once where one process counts them all.
+const AT_ONCE: i32 = 256;
+
+impl Parting {
+    /// Counted by all ranks together.
+    ///
+    /// # Errors
+    /// The body that cannot be laid out, on all ranks alike.
+    pub fn among(scene: &Scene, team: &Team) -> Result<Self, SceneError> {
+        let columns = agreed(scene, team, columns_of(scene))?;
+        let cut = |rank: usize| columns.start + (columns.len() * rank / team.count()) as i32;
+        let census = agreed(scene, team, census(scene, cut(team.rank())..cut(team.rank() + 1)))?;
+        let sizes: Vec<usize> = (0..team.count()).map(|rank| (cut(rank + 1) - cut(rank)) as usize).collect();
+        let counts = team.gather(&census.counts, &sizes);
+        let extents = team.each(extent_words(&census.extent)).into_iter().map(extent_of);
+        let extent = extents.fold(Extent::NONE, Extent::or);
+        Self::new(scene, (columns, counts, extent), (team.count(), agreed_caches(team)))
+    }
+
+    /// Counted by this process alone, for so many ranks.
+    ///
+    /// # Errors
+    /// The body that cannot be laid out.
+    pub fn alone(scene: &Scene, ranks: usize) -> Result<Self, SceneError> {
+        let columns = columns_of(scene)?;
+        let (mut counts, mut extent) = (Vec::new(), Extent::NONE);
+        for start in columns.clone().step_by(AT_ONCE as usize) {
+            let census = census(scene, start..(start + AT_ONCE).min(columns.end))?;
+            counts.extend(census.counts);
+            extent = extent.or(census.extent);
+        }
+        Self::new(scene, (columns, counts, extent), (ranks, Caches::here()))
+    }
+
+    fn new(
+        scene: &Scene,
+        (columns, counts, extent): (Range<i32>, Vec<u64>, Extent),
+        (ranks, caches): (usize, Caches),
+    ) -> Result<Self, SceneError> {
+        let outlay = outlay(scene)?;
+        if extent.bounds.0[0] > extent.bounds.1[0] {
+            return Err(refuse_body(scene, &empty(outlay.lattice, outlay.cut)));
+        }
+        let reach = outlay.reach().map_err(|error| refuse_body(scene, &error))?;
+        let cuts = cuts(counts.iter().map(|&count| count as usize), ranks);
+        let mut before = vec![0];
+        before.extend(counts.iter().scan(0, |sum, count| {
+            *sum += count;
+            Some(*sum)
+        }));
+        let largest = counts.iter().copied().max().unwrap_or(0);
+        let total = *before.last().unwrap_or(&0);
+        let share = Share { ranks, caches, ..Share::whole() };
+        let band = usual_band((reach as u64 * largest) as usize, total as usize, share) as u64;
+        let sizes = cuts.windows(2).map(|ends| before[ends[1]] - before[ends[0]]);
+        let least = sizes.filter(|&size| size > 0).min().unwrap_or(0);
+        let halo = (steps_of((least / band) as usize) as u64 + 1) * band;
+        Ok(Self { columns, before, extent, reach, cuts, halo })
+    }
+
+    /// Particles of each rank, shape \[ranks\].
+    pub fn counts(&self) -> Vec<usize> {
+        self.cuts.windows(2).map(|ends| self.particles(&(ends[0]..ends[1]))).collect()
+    }
+
+    /// Particles of the body.
+    pub fn total(&self) -> usize {
+        self.before.last().map_or(0, |&total| total as usize)
+    }
+
+    /// The rank whose part takes most memory.
+    pub fn largest(&self) -> usize {
+        let held = |rank: &usize| self.particles(&self.window(&self.exact(*rank)));
+        (0..self.cuts.len() - 1).max_by_key(held).unwrap_or(0)
+    }
+
+    fn particles(&self, columns: &Range<usize>) -> usize {
+        (self.before[columns.end] - self.before[columns.start]) as usize
+    }
+
+    fn owned(&self, rank: usize) -> Range<usize> {
+        self.cuts[rank]..self.cuts[rank + 1]
+    }
+
+    /// The columns of a rank with those around them that its halos take: at least what a frame may look at across an edge, and
+    /// back.
+    fn exact(&self, rank: usize) -> Range<usize> {
+        let Range { start, end } = self.owned(rank);
+        let (from, to) = (self.before[start].saturating_sub(self.halo), self.before[end] + self.halo);
+        let least = 4 * self.reach as usize;
+        let low = self.before.partition_point(|&before| before < from).min(start.saturating_sub(least));
+        let high = self.before.partition_point(|&before| before < to).max(end + least);
+        low..high.min(self.columns.len())
+    }
+
+    /// The same with those that their neighbours stand in.
+    fn window(&self, exact: &Range<usize>) -> Range<usize> {
+        let reach = self.reach as usize;
+        exact.start.saturating_sub(reach)..(exact.end + reach).min(self.columns.len())
+    }
+
+    /// Lays out the part of a rank.
+    ///
+    /// # Errors
+    /// As [`Layout::new`], but for what needs the whole body.
+    pub fn lay_out(&self, scene: &Scene, rank: usize) -> Result<Layout, SceneError> {
+        let outlay = outlay(scene)?;
+        let (owned, exact) = (self.owned(rank), self.exact(rank));
+        let column = |number: usize| self.columns.start + number as i32;
+        let window = self.window(&exact);
+        let laid_out = outlay.lay_out(Some(column(window.start)..column(window.end)));
+        let (mut body, neighbours) = laid_out.map_err(|error| refuse_body(scene, &error))?;
+        let before = |number: usize| body.sites.partition_point(|site| site[0] < column(number));
+        let here = |columns: &Range<usize>| before(columns.start)..before(columns.end);
+        let (total, whole) = (self.total(), self.extent);
+        let (owned_here, exact_here) = (here(&owned), here(&exact));
+        debug_assert_eq!(owned_here.len(), self.particles(&owned));
+        debug_assert_eq!(exact_here.len(), self.particles(&exact));
+        let first = self.before[owned.start] as usize - owned_here.start;
+        body.part = Some(Part { first, total, owned: owned_here, exact: exact_here, whole });
+        Layout::of_part(scene, body, neighbours)
+    }
+}
+
+fn outlay(scene: &Scene) -> Result<Outlay<'_>, SceneError> {
+    let BodySource::Cut(cut) = &scene.body else {
+        return Err(scene.refuse("body.shape", "points are no columns", "run it as a whole"));
+    };
+    Ok(Outlay { lattice: &scene.lattice, cut, neighbourhood: &scene.neighbourhood, frame: scene.frame })
+}
+
+fn columns_of(scene: &Scene) -> Result<Range<i32>, SceneError> {
+    outlay(scene)?.columns().map_err(|error| refuse_body(scene, &error))
+}
+
+fn census(scene: &Scene, columns: Range<i32>) -> Result<Census, SceneError> {
+    outlay(scene)?.count(columns).map_err(|error| refuse_body(scene, &error))
+}
+
+/// The first rank's caches: halos are measured by them.
+fn agreed_caches(team: &Team) -> Caches {
+    let Caches { whole_body, band } = Caches::here();
+    let [whole_body, band] = team.of_first([whole_body as u64, band.map_or(u64::MAX, |band| band as u64)]);
+    Caches { whole_body: whole_body as usize, band: Some(band as usize).filter(|_| band != u64::MAX) }
+}
+
+fn extent_words(Extent { bounds: (low, high), lowest, neighbours }: &Extent) -> [u64; 7] {
+    let [a, b, c, d] = [low[0], low[1], high[0], high[1]].map(f64::to_bits);
+    let [column, row] = lowest.map(|k| i64::from(k) as u64);
+    [a, b, c, d, column, row, *neighbours as u64]
+}
+
+fn extent_of([a, b, c, d, column, row, neighbours]: [u64; 7]) -> Extent {
+    let [a, b, c, d] = [a, b, c, d].map(f64::from_bits);
+    let lowest = [column, row].map(|k| k as i64 as i32);
+    Extent { bounds: ([a, b], [c, d]), lowest, neighbours: neighbours as usize }
+}
+
+/// The result of all ranks: if one refuses, all refuse with the words of the first that does.
+///
+/// # Errors
+/// The first rank's that has one.
+pub fn agreed<T>(scene: &Scene, team: &Team, own: Result<T, SceneError>) -> Result<T, SceneError> {
+    let problem = own.as_ref().err().and_then(|error| error.problems().first());
+    let words = problem.map_or_else(Vec::new, |problem| {
+        let help = problem.help.as_deref().unwrap_or_default();
+        [&problem.key, &problem.message, help].join("\0").into_bytes()
+    });
+    let all = team.each_bytes(&words);
+    let first = all.iter().find(|words| !words.is_empty());
+    match (own, first) {
+        (Ok(own), None) => Ok(own),
+        (own, Some(words)) => {
+            let text = String::from_utf8_lossy(words);
+            let mut parts = text.split('\0');
+            let [key, message, help] = std::array::from_fn(|_| parts.next().unwrap_or_default());
+            Err(own.err().unwrap_or_else(|| scene.refuse(key, message, help)))
+        }
+        (Err(own), None) => Err(own),
+    }
+}
+
+/// Refuses a body that is in pieces, as [`Body::require_connected`] does; for all ranks together.
+///
+/// # Errors
+/// On all ranks alike.
+pub fn require_connected(body: &Body, neighbours: &Neighbours, team: &Team) -> Result<(), BodyError> {
+    let Some(Part { first, owned, exact, .. }) = &body.part else {
+        return body.require_connected(neighbours);
+    };
+    let mut sets = DisjointSets::new(body.count());
+    for i in exact.clone() {
+        let seen = neighbours.of(i).iter().filter(|&&k| !body.is_frame[k as usize]);
+        seen.filter(|&&k| exact.contains(&(k as usize))).for_each(|&k| sets.join(i as u32, k));
+    }
+    let labels = sets.labels();
+    let rank = team.rank() as u64;
+    // Those just beyond the end of this part, by which bonds lead to others: as far as the last of its own see.
+    let sees = |i: usize| neighbours.of(i).iter().map(|&k| k as usize).max().unwrap_or(i);
+    let end = owned.clone().map(sees).max().map_or(owned.end, |last| (last + 1).clamp(owned.end, exact.end));
+    let beyond = (owned.end..end).filter(|&i| !body.is_frame[i]);
+    let told: Vec<u64> = beyond.flat_map(|i| [(first + i) as u64, rank, u64::from(labels[i])]).collect();
+    let all = gather_all(team, &told);
+    let here = |id: u64| (id as usize).checked_sub(*first).filter(|i| owned.contains(i));
+    let pairs: BTreeSet<[u64; 4]> = all
+        .chunks_exact(3)
+        .filter_map(|of| Some([of[1], of[2], rank, u64::from(labels[here(of[0])?])]))
+        .collect();
+    let pairs = gather_all(team, &pairs.into_iter().flatten().collect::<Vec<_>>());
+    // The first particle of each piece of this part.
+    let mut pieces: BTreeMap<u32, u64> = BTreeMap::new();
+    for i in owned.clone().filter(|&i| !body.is_frame[i]) {
+        pieces.entry(labels[i]).or_insert((first + i) as u64);
+    }
+    let own: Vec<u64> = pieces.into_iter().flat_map(|(label, id)| [rank, u64::from(label), id]).collect();
+    let pieces = gather_all(team, &own);
+    let numbers: BTreeMap<[u64; 2], u32> = {
+        let nodes = pieces.chunks_exact(3).map(|of| [of[0], of[1]]);
+        let ends = pairs.chunks_exact(2).map(|of| [of[0], of[1]]);
+        nodes.chain(ends).collect::<BTreeSet<_>>().into_iter().zip(0..).collect()
+    };
+    let mut sets = DisjointSets::new(numbers.len());
+    for pair in pairs.chunks_exact(4) {
+        sets.join(numbers[&[pair[0], pair[1]]], numbers[&[pair[2], pair[3]]]);
+    }
+    let labels = sets.labels();
+    let mut firsts: BTreeMap<u32, u64> = BTreeMap::new();
+    for of in pieces.chunks_exact(3) {
+        let label = labels[numbers[&[of[0], of[1]]] as usize];
+        let known = firsts.entry(label).or_insert(of[2]);
+        *known = of[2].min(*known);
+    }
+    let mut ids: Vec<u64> = firsts.into_values().collect();
+    ids.sort_unstable();
+    match ids[..] {
+        [first, second, ..] => {
+            let [first, second] = [first, second].map(|index| index as usize + 1);
+            Err(BodyError::Disconnected { parts: ids.len(), first, second })
+        }
+        _ => Ok(()),
+    }
+}
+
+fn gather_all(team: &Team, own: &[u64]) -> Vec<u64> {
+    let counts: Vec<usize> =
+        team.each([own.len() as u64]).into_iter().map(|[count]| count as usize).collect();
+    team.gather(own, &counts)
+}
