@@ -207,7 +207,7 @@ fn what_is_wrong_is_said_once_and_nothing_is_left() {
                 &PARTED[..],
             ]
             .concat(),
-            "the body falls into 2 parts that are no neighbours of each other: particle 1 and particle 146",
+            "the body falls into 2 parts that are no neighbours of each other: particle 1 and particle 151",
         ),
         (vec!["compare", "beam"], "`compare` runs on one"),
         (vec!["live", "tension"], "`live` runs on one"),
