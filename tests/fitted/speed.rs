@@ -11,8 +11,9 @@ use crate::support::{lattice, scene};
 const ROUNDS: usize = 25;
 
 /// Most that a fitted body may take, in times of the same shape in whole cells along the axes of its lattice. Rows along an
-/// outline are each of their own (7 232 in the sieve on squares, against 31), so that their coefficients come from beyond
-/// the second cache, where those of whole cells stay in the first: in instructions alone it would be 1.47 times for the sieve.
+/// outline are each of their own (7 232 in the sieve on squares, against 31): their products are taken neighbour by
+/// neighbour, where those of whole cells are taken for 8 particles at a time. It is not the caches: measured on an AMD EPYC
+/// (Zen 4), a row of 9 neighbours takes 8 ns whether there are 60 of them or 40 000.
 const MOST: f64 = 1.5;
 
 fn holes(count: usize, radius: f64) -> String {
