@@ -601,10 +601,9 @@ fn parted(scene: &Scene, every: usize, ranks: usize) -> End {
         let mut looks = Looks::every(if team.is_first() { every } else { 1 });
         let outcome = run_shared(plan, None, &team, &mut looks).expect("can be shared");
         let engine = &outcome.engine;
-        let of = |points: &Vectors| {
-            points.x[owned.clone()].to_vec().into_iter().zip(points.y[owned.clone()].to_vec())
-        };
-        let places: Vec<_> = of(engine.present()).zip(of(engine.previous())).collect();
+        let of = |points: &Vectors, i: usize| (points.x[i], points.y[i]);
+        let places: Vec<_> =
+            owned.clone().map(|i| (of(engine.present(), i), of(engine.previous(), i))).collect();
         let energies: Vec<_> = owned.clone().map(|i| [engine.pe1(i), engine.pe2(i)]).collect();
         let roles = engine.roles()[owned.clone()].to_vec();
         let sums = engine.energies();
