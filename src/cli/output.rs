@@ -72,7 +72,7 @@ fn opener(file: &Path) -> Command {
 /// Which figures there shall be.
 #[derive(Debug, Args)]
 pub struct FigureArguments {
-    /// Files to draw figures as; none leaves the tables, the summary and report.html
+    /// Files to draw figures as; none leaves everything that is no figure
     #[arg(long, value_name = "FORMATS", value_enum, default_value = "all")]
     pub figures: Formats,
 }

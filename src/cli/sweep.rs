@@ -60,10 +60,10 @@ pub struct SweepArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Go on with the killed or interrupted sweep to this --out
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["scene", "out", "force", "merge"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["scene", "out", "force", "merge", "vary", "set", "samples", "outputs", "shard"])]
     resume: Option<PathBuf>,
     /// Put the shards in these folders together
-    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "scene")]
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["scene", "vary", "set", "samples", "outputs", "shard"])]
     merge: Vec<PathBuf>,
     #[command(flatten)]
     output: OutputArguments,

@@ -176,6 +176,8 @@ fn what_cannot_be_swept_is_refused_and_leaves_nothing() {
     refused(&["sweep", "tension"], &["--vary"]);
     refused(&["sweep", "square", "--vary", "a=0:1:2"], &["`square` is a swarm"]);
     refused(&["sweep", "--resume", "nowhere"], &["nowhere.unfinished", "holds a sweep"]);
+    refused(&["sweep", "--resume", "nowhere", "--vary", "a=0:1:2"], &["--vary", "cannot be used with"]);
+    refused(&["sweep", "--merge", "nowhere", "--set", "a=0"], &["--set", "cannot be used with"]);
 }
 
 #[test]
