@@ -20,18 +20,13 @@ pub fn film<'a>(
     colour: FilmColour,
 ) -> Film<'a> {
     let frames = chosen(recorder.frames().len());
-    let values = move |frame: usize| -> Option<Vec<f64>> {
-        let tracks = &recorder.frames()[frame].tracks;
-        Some(match colour {
-            FilmColour::Displacement => {
-                let both = tracks[0].values().into_iter().zip(tracks[1].values());
-                both.map(|(x, y)| x.hypot(y)).collect()
-            }
-            FilmColour::Clearance => tracks[2].values(),
-            FilmColour::Pe1 => tracks[4].values(),
-            FilmColour::Strain => tracks[5].values(),
-            FilmColour::Role | FilmColour::Pe2 | FilmColour::VonMises => return None,
-        })
+    let values = move |frame: usize| match colour {
+        FilmColour::Role => None,
+        FilmColour::Displacement => {
+            let [dx, dy] = ["dx", "dy"].map(|name| recorder.values(frame, name));
+            Some(dx?.into_iter().zip(dy?).map(|(x, y)| x.hypot(y)).collect::<Vec<_>>())
+        }
+        _ => recorder.values(frame, colour.name()),
     };
     let finite =
         |frame: &usize| values(*frame).unwrap_or_default().into_iter().filter(|value| value.is_finite());
@@ -39,8 +34,8 @@ pub fn film<'a>(
     let range = range.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [f64::min(l, v), f64::max(h, v)]);
     let scale = scale(colour, range);
     let places = move |frame: usize| -> Vectors {
-        let tracks = &recorder.frames()[frame].tracks;
-        let moved = tracks[0].values().into_iter().zip(tracks[1].values());
+        let [dx, dy] = ["dx", "dy"].map(|name| recorder.values(frame, name).unwrap_or_default());
+        let moved = dx.into_iter().zip(dy);
         recorder.start().iter().zip(moved).map(|([x, y], (dx, dy))| [x + dx, y + dy]).collect()
     };
     let map = Map::of_film(swarm, record, report);
@@ -58,12 +53,11 @@ pub fn film<'a>(
 }
 
 fn scale(colour: FilmColour, [low, high]: [f64; 2]) -> Option<Scale<'static>> {
-    let (quantity, unit, noise) = match colour {
-        FilmColour::Displacement => ("displacement", "m", NOISE),
-        FilmColour::Clearance => ("clearance", "m", NOISE),
-        FilmColour::Pe1 => ("PE1", "m²", NOISE * NOISE),
-        FilmColour::Strain => ("largest strain", "", NOISE),
-        FilmColour::Role | FilmColour::Pe2 | FilmColour::VonMises => return None,
+    let (quantity, unit) = match colour {
+        FilmColour::Role => return None,
+        FilmColour::Displacement => ("displacement", "m"),
+        _ => FlightRecorder::label_and_unit(colour.name())?,
     };
+    let noise = if colour == FilmColour::Pe1 { NOISE * NOISE } else { NOISE };
     Some(Scale { quantity, unit: unit.into(), bands: Bands::around(low, high, noise) })
 }

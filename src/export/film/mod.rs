@@ -51,6 +51,12 @@ pub enum FilmColour {
     VonMises,
     /// Free space around a robot.
     Clearance,
+    /// Distance of a robot from its place.
+    Away,
+    /// Speed of a robot.
+    Speed,
+    /// Acceleration of a robot.
+    Acceleration,
 }
 
 impl FilmColour {
@@ -59,8 +65,16 @@ impl FilmColour {
         [Self::Role, Self::Displacement, Self::Pe1, Self::Pe2, Self::Strain, Self::VonMises];
 
     /// Those of robots.
-    pub const OF_SWARMS: [Self; 5] =
-        [Self::Role, Self::Displacement, Self::Pe1, Self::Strain, Self::Clearance];
+    pub const OF_SWARMS: [Self; 8] = [
+        Self::Role,
+        Self::Displacement,
+        Self::Clearance,
+        Self::Away,
+        Self::Speed,
+        Self::Acceleration,
+        Self::Pe1,
+        Self::Strain,
+    ];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
@@ -72,6 +86,9 @@ impl FilmColour {
             Self::Strain => "strain",
             Self::VonMises => "von-mises",
             Self::Clearance => "clearance",
+            Self::Away => "away",
+            Self::Speed => "speed",
+            Self::Acceleration => "acceleration",
         }
     }
 }

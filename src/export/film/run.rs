@@ -31,6 +31,7 @@ pub fn require_colour(scene: &Scene, colour: FilmColour) -> Result<(), FilmError
         FilmColour::VonMises if scene.material.is_none() => "the scene has no material",
         FilmColour::Pe2 if scene.is_solved_at_once() => "a body that is solved for at once makes no moves",
         FilmColour::Clearance => "particles keep no clearance, robots do",
+        FilmColour::Away | FilmColour::Speed | FilmColour::Acceleration => "it is a quantity of robots",
         _ => return Ok(()),
     };
     let colour = colour.name();
@@ -119,7 +120,11 @@ impl Shown<'_> {
         // Of neighbours that are found anew the recorder has kept what the engine saw.
         let is_kept = tracks.len() > 4;
         Some(match self.colour {
-            FilmColour::Role | FilmColour::Clearance => return None,
+            FilmColour::Role
+            | FilmColour::Clearance
+            | FilmColour::Away
+            | FilmColour::Speed
+            | FilmColour::Acceleration => return None,
             FilmColour::Displacement => self.displacement(frame).iter().map(|[x, y]| x.hypot(y)).collect(),
             FilmColour::Pe2 => tracks[2].values(),
             FilmColour::Pe1 if is_kept => tracks[3].values(),
@@ -170,7 +175,11 @@ impl Shown<'_> {
     fn scale(&self, setting: &Setting) -> Option<Scale<'static>> {
         let (unit, spacing) = (self.scene.unit(), self.engine.body().lattice.spacing());
         let (quantity, unit, noise) = match self.colour {
-            FilmColour::Role | FilmColour::Clearance => return None,
+            FilmColour::Role
+            | FilmColour::Clearance
+            | FilmColour::Away
+            | FilmColour::Speed
+            | FilmColour::Acceleration => return None,
             FilmColour::Displacement => ("displacement", unit.to_owned(), NOISE * spacing),
             FilmColour::Pe1 => ("PE1", format!("{unit}²"), (NOISE * spacing).powi(2)),
             FilmColour::Pe2 => ("PE2", unit.to_owned(), NOISE * spacing),

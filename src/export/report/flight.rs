@@ -64,8 +64,7 @@ impl FlightRecorder {
 
     /// Robots at these places \[m\], with displacements from `start` \[m\].
     fn since(control: &Control, places: &Vectors, start: Vectors) -> Self {
-        let names = ["dx", "dy"].into_iter().chain(QUANTITIES.map(|(name, ..)| name));
-        let channels = names.map(|name| Channel { name, bits: BITS }).collect();
+        let channels = Self::names().map(|name| Channel { name, bits: BITS }).collect();
         let formation = control.formation();
         let count = formation.count();
         // Seen from both ends or from one, a line between two robots is one line.
@@ -130,6 +129,23 @@ impl FlightRecorder {
 
     pub(in crate::export) fn frames(&self) -> &[Frame] {
         self.frames.kept()
+    }
+
+    /// Values of a quantity in a frame, by robot; `dx` and `dy` are displacements \[m\].
+    pub(in crate::export) fn values(&self, frame: usize, name: &str) -> Option<Vec<f64>> {
+        let track = Self::names().position(|known| known == name)?;
+        Some(self.frames.kept()[frame].tracks[track].values())
+    }
+
+    /// Label and unit of a quantity of frames.
+    pub(in crate::export) fn label_and_unit(name: &str) -> Option<(&'static str, &'static str)> {
+        let (_, label, unit) = QUANTITIES.into_iter().find(|(known, ..)| *known == name)?;
+        Some((label, unit))
+    }
+
+    /// Names of the channels, in their order.
+    fn names() -> impl Iterator<Item = &'static str> {
+        ["dx", "dy"].into_iter().chain(QUANTITIES.map(|(name, ..)| name))
     }
 
     /// Time of a frame \[s\].
@@ -343,4 +359,37 @@ fn texts(swarm: &Swarm) -> Vec<(String, String)> {
     }
     texts.push(("Swarm, with its defaults and overrides".into(), scene_text(&swarm.raw)));
     texts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::bundled::bundled_swarm;
+
+    #[test]
+    fn a_quantity_of_a_frame_is_found_by_its_name() {
+        let swarm = bundled_swarm("square").expect("bundled").load_swarm(&[]).expect("valid");
+        let mut flight = Flight::new(&swarm).expect("flies");
+        let mut recorder = FlightRecorder::new(&flight);
+        for _ in 0..64 {
+            flight.step();
+            recorder.watch(&flight);
+        }
+        let last = recorder.frames().len() - 1;
+        assert_eq!(recorder.frames()[last].step as u64, flight.periods().min(64));
+        let (control, places) = (flight.control(), flight.fleet().places());
+        let mut clearance = Vec::new();
+        control.filter().clearance(&places, &mut clearance);
+        let robots = flight.fleet().robots().iter();
+        let speed: Vec<f64> = robots.map(|robot| robot.velocity[0].hypot(robot.velocity[1])).collect();
+        let measures = control.formation().measures(&places);
+        for (name, expected) in [("clearance", &clearance), ("speed", &speed), ("pe1", &measures.pe1)] {
+            let values = recorder.values(last, name).expect("known");
+            let largest = expected.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+            assert!(largest > 0.0, "{name}");
+            let off = values.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(off <= 1e-6 * largest, "{name}: {off} of {largest}");
+        }
+        assert_eq!(recorder.values(last, "von-mises"), None);
+    }
 }
