@@ -88,7 +88,8 @@ pub(super) fn chart(study: &Study) -> Chart {
         study.truth_nodes
     );
     let axes = [Axis::log("time", "s"), Axis::log("relative L2 error of the displacement", "")];
-    let truth = Landmark { x: study.truth_seconds, name: "the finite elements themselves".into(), colour: "#8a8f98" };
+    let truth =
+        Landmark { x: study.truth_seconds, name: "the finite elements themselves".into(), colour: "#8a8f98" };
     Chart { landmarks: vec![truth], ..Chart::new("What accuracy costs", note, axes, all) }
 }
 
