@@ -68,7 +68,7 @@ pub fn live(arguments: &LiveArguments) -> Result<ExitCode, Refusal> {
     let session = served?;
     if let Some(recording) = recording {
         if session.frame(&[]).clock == 0.0 {
-            // Its file would be run to its end, which nobody has done.
+            // Its file would be run to its end, and no period of it was flown.
             let what = if session.is_body() { "no step was taken" } else { "no period was flown" };
             recording.take().map_or(Ok(()), Recording::discard)?;
             say(&format!("{what}: nothing is recorded\n"))?;

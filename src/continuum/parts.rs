@@ -276,8 +276,8 @@ pub fn require_connected(body: &Body, neighbours: &Neighbours, team: &Team) -> R
     let sees = |i: usize| neighbours.of(i).iter().map(|&k| k as usize).max().unwrap_or(i);
     let end = owned.clone().map(sees).max().map_or(owned.end, |last| (last + 1).clamp(owned.end, exact.end));
     let beyond = (owned.end..end).filter(|&i| !body.is_frame[i]);
-    let told: Vec<u64> = beyond.flat_map(|i| [(first + i) as u64, rank, u64::from(labels[i])]).collect();
-    let all = gather_all(team, &told);
+    let labelled: Vec<u64> = beyond.flat_map(|i| [(first + i) as u64, rank, u64::from(labels[i])]).collect();
+    let all = gather_all(team, &labelled);
     let here = |id: u64| (id as usize).checked_sub(*first).filter(|i| owned.contains(i));
     let pairs: BTreeSet<[u64; 4]> = all
         .chunks_exact(3)

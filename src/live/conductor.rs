@@ -61,7 +61,7 @@ pub struct Conductor {
     layout: Option<u64>,
     /// Why it goes on no further.
     stopped: Option<String>,
-    /// Viewers whose last grasp was refused: what they drag is nothing, which they have been told.
+    /// Viewers whose last grasp was refused: what they drag is nothing, as the refusal said.
     empty_handed: BTreeSet<Viewer>,
 }
 

@@ -343,7 +343,7 @@ fn a_program_whose_file_is_removed_or_replaced_goes_on_when_its_worker_dies() {
         put_in_place.iter().for_each(|text| std::fs::write(&program, text).expect("written"));
         signal("KILL", worker);
         worker = until("another worker", || node.worker().filter(|&process| process != worker));
-        until("it is told", || lines.try_iter().find(|line| line.contains("goes on")));
+        until("a line that says so", || lines.try_iter().find(|line| line.contains("goes on")));
         std::fs::write(&program, "").expect("written");
     }
     assert_eq!(node.terminate(), Some(0));

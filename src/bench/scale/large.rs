@@ -121,7 +121,7 @@ pub(super) fn beside_threads(
                 let whole = whole.as_mut().expect("the first rank has it");
                 threads.install(|| step(whole, MOST_STEPS, most));
             };
-            // The first steps begin where everybody knows everything.
+            // The first steps begin where every rank knows the whole body.
             step(&mut parts, MOST_STEPS, most);
             in_turns(team, effort.turns, &mut alone, || step(&mut parts, MOST_STEPS, most))
         };

@@ -124,7 +124,7 @@ pub fn count(team: &Team, plan: &Plan, steps: usize) -> (Tally, u64) {
     let tally = Arc::new(Mutex::new(Tally::default()));
     let counted = Counted { team: team.clone(), tally: Arc::clone(&tally) };
     let mut engine = engine(plan, Some(Team::new(counted)));
-    // The first steps begin where everybody knows everything.
+    // The first steps begin where every rank knows the whole body.
     step(&mut engine, MOST_STEPS, MOST_STEPS);
     let counted = |engine: &Engine| engine.activity().clone().take_counts()[0];
     let before = counted(&engine);

@@ -119,7 +119,7 @@ impl<S: ServiceType> Service<S> {
         let mut body = Vec::new();
         encode(response, &mut body).map_err(refused)?;
         let options = match &id.0 {
-            // In pieces nobody takes it, and a client that was sent such pieces takes no later reply either.
+            // In pieces no reader takes it, and a client that was sent such pieces takes no later reply either.
             Mark::Enhanced(_) if body.len() > LARGEST => {
                 let length = body.len();
                 return Err(refused(format!(

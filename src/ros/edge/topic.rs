@@ -84,7 +84,7 @@ struct Silence {
     patience: Duration,
 }
 
-/// Least and largest silence after which a reader is replaced \[s\], and the part of it over the longest time between two messages.
+/// Least and largest silence after which a reader is replaced \[s\], and how many times as long as between the last two messages.
 const PATIENCE: [Duration; 2] = [Duration::from_secs(2), Duration::from_secs(60)];
 const OVER_PERIOD: u32 = 4;
 
@@ -133,7 +133,7 @@ impl<M: Message> Subscription<M> {
         let Some(Silence { since, patience }) = self.silence.get() else { return };
         let quiet = since.map(|since| since.elapsed());
         if came {
-            let patience = (OVER_PERIOD * quiet.unwrap_or_default()).max(patience).min(PATIENCE[1]);
+            let patience = (OVER_PERIOD * quiet.unwrap_or_default()).clamp(PATIENCE[0], PATIENCE[1]);
             return self.silence.set(Some(Silence { since: Some(Instant::now()), patience }));
         }
         if quiet.is_none_or(|quiet| quiet < patience) || self.matched() == 0 || !self.shared.may_renew() {
@@ -325,5 +325,9 @@ mod tests {
         assert_eq!(during(1.0, false), [0; 2], "the gap is believed");
         let [steady, other] = during(4.0, false);
         assert!(steady > 10 && other == 0, "{steady}, {other}");
+        // As soon the second time: what has passed makes it no more patient.
+        during(0.1, true);
+        let [steady, _] = during(3.5, false);
+        assert!(steady > 10, "{steady}");
     }
 }
