@@ -215,7 +215,12 @@ fn what_cannot_become_a_film_is_refused_before_the_run() {
     let output = flockform(&["swarm", "square", "--film", "a.gif", "--film-colour", "pe2"], folder.path());
     let said = text(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
-    assert!(said.contains("possible values: role, displacement, pe1, strain, clearance"), "{said}");
+    assert!(
+        said.contains(
+            "possible values: role, displacement, clearance, away, speed, acceleration, pe1, strain"
+        ),
+        "{said}"
+    );
 }
 
 #[test]
