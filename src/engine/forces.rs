@@ -13,6 +13,7 @@ use crate::flock::law::Weights;
 use crate::flock::role::Role;
 use crate::flock::rules::{Mean, Rotation};
 use crate::flock::vectors::Vectors;
+use crate::geometry::point::{cross, dot, minus, plus};
 
 /// The resultant of the loads on a body. Moments are positive counter-clockwise; their arms end where the particles
 /// were in the reference configuration under small rotations, and where they are at present if the rule is corotated.
@@ -222,20 +223,4 @@ pub fn held(engine: &Engine) -> Vec<Vec<Held>> {
         }
     }
     held
-}
-
-fn plus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    [a[0] + b[0], a[1] + b[1]]
-}
-
-fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    [a[0] - b[0], a[1] - b[1]]
-}
-
-fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
-    a[0] * b[0] + a[1] * b[1]
-}
-
-fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
-    a[0] * b[1] - a[1] * b[0]
 }

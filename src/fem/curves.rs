@@ -3,8 +3,7 @@
 
 use crate::geometry::outline::{Outline, Place};
 use crate::geometry::piece::Piece;
-
-type Point = [f64; 2];
+use crate::geometry::point::{Point, distance, minus};
 
 /// Points nearer than this part of the body's size are one.
 pub(crate) const MERGED: f64 = 1e-6;
@@ -251,14 +250,6 @@ fn circle_circle((c, r): (Point, f64), (d, s): (Point, f64)) -> Vec<Point> {
     let half = (r * r - along * along).max(0.0).sqrt();
     let u = off.map(|v| v / apart);
     [-half, half].map(|h| [c[0] + along * u[0] - h * u[1], c[1] + along * u[1] + h * u[0]]).to_vec()
-}
-
-pub(crate) fn minus(a: Point, b: Point) -> Point {
-    [a[0] - b[0], a[1] - b[1]]
-}
-
-pub(crate) fn distance(a: Point, b: Point) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
 #[cfg(test)]

@@ -10,11 +10,10 @@ use std::collections::HashMap;
 use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, PositionInTriangulation, Triangulation};
 
-use super::curves::{Curves, distance};
+use super::curves::Curves;
 use super::error::FemError;
 use super::size::{GROWTH, Sizes};
-
-type Point = [f64; 2];
+use crate::geometry::point::{Point, distance};
 
 /// Radius of the circumscribed circle over the size asked for, above which a triangle is too large.
 const LARGE: f64 = 0.75;

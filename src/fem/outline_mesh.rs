@@ -13,10 +13,9 @@ use super::delaunay::{Stretch, triangulate};
 use super::element::CellKind;
 use super::error::FemError;
 use super::mesh::{Mesh, Side};
+use crate::geometry::Point;
 use crate::geometry::outline::{Outline, Place};
 use crate::geometry::piece::Piece;
-
-type Point = [f64; 2];
 
 /// Shortest first part of a side that is cut towards a singular point.
 const STRONGEST_CUT: f64 = 0.25;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::curves::{MERGED, distance};
+use super::curves::MERGED;
 use super::error::FemError;
 use super::material::{Inclusions, Material};
 use super::outline_mesh::OutlineMesh;
@@ -11,9 +11,8 @@ use super::strain::Strain;
 use super::{Axis, Mesh};
 use crate::geometry::outline::{Outline, Place};
 use crate::geometry::piece::Piece;
+use crate::geometry::point::{Point, distance};
 use crate::geometry::portion::Portion;
-
-type Point = [f64; 2];
 
 /// Grading of the mesh at the ends of supports, and at those of loads.
 const AT_SUPPORT: f64 = 0.75;

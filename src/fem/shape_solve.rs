@@ -16,8 +16,7 @@ use super::shape_problem::ShapeProblem;
 use super::solution::Solution;
 use super::solve::solve_near;
 use super::strain::Strain;
-
-type Point = [f64; 2];
+use crate::geometry::Point;
 
 /// How far a solution goes.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,9 +7,8 @@
 
 use std::f64::consts::TAU;
 
-use super::curves::{Curves, Span, distance};
-
-type Point = [f64; 2];
+use super::curves::{Curves, Span};
+use crate::geometry::point::{Point, distance};
 
 /// Growth of the size with the distance from something small.
 pub(crate) const GROWTH: f64 = 0.4;

@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+pub use crate::geometry::point::distance;
+
 /// One vector in the plane for each particle, shape \[count\] each: positions and displacements
 /// \[length unit of the scene, world frame\], forces, residuals.
 ///
@@ -92,9 +94,4 @@ impl<T> FromIterator<[T; 2]> for Vectors<T> {
         let (x, y) = vectors.into_iter().map(|[x, y]| (x, y)).unzip();
         Self { x, y }
     }
-}
-
-/// Euclidean distance; `hypot`, so that coordinates near 1e±150 neither overflow nor vanish.
-pub fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
 }

@@ -1,6 +1,6 @@
 //! Boxes in a tree: which of many overlap a given one, and which of many things is nearest to a point.
 
-type Point = [f64; 2];
+use super::point::{Point, bounds};
 
 /// Boxes that one leaf holds at most.
 const LEAF: usize = 8;
@@ -54,11 +54,7 @@ impl BoxTree {
 
     /// Adds the node of some of the boxes, and those below it.
     fn divide(&mut self, from: usize, to: usize) {
-        let covered = self.boxes[from..to].iter().map(|one| (one.low, one.high));
-        let (low, high) = covered
-            .fold(([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]), |(low, high), (l, h)| {
-                ([0, 1].map(|k| low[k].min(l[k])), [0, 1].map(|k| high[k].max(h[k])))
-            });
+        let (low, high) = bounds(self.boxes[from..to].iter().flat_map(|one| [one.low, one.high]));
         let at = self.nodes.len();
         self.nodes.push(Node { low, high, next: 0, boxes: [0; 2] });
         if to - from <= LEAF {

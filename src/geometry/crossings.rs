@@ -2,7 +2,8 @@
 
 use super::box_tree::BoxTree;
 use super::outline::OutlineError;
-use super::piece::{Piece, Point, bounds, distance, minus};
+use super::piece::Piece;
+use super::point::{Point, bounds, distance, minus};
 
 /// A straight part of the outline, where it is tested for crossings.
 #[derive(Clone, Copy, Debug)]

@@ -2,10 +2,9 @@
 
 use super::box_tree::BoxTree;
 use super::outline::{Outline, Place};
-use super::piece::{Piece, distance, is_inside};
+use super::piece::{Piece, is_inside};
+use super::point::{Point, distance};
 use super::shape::{Segment, Shape, crossing, path_contains, segment_distance};
-
-type Point = [f64; 2];
 
 /// A shape to be asked about points in rows: where a row crosses the boundary is found once for all of its points.
 #[derive(Clone, Debug)]

@@ -1,6 +1,7 @@
 //! Where edges and arcs meet.
 
-use super::piece::{Piece, distance};
+use super::piece::Piece;
+use super::point::distance;
 
 /// Where the segment from `a` to `b` meets a piece: shares of the way along either, from 0 to 1.
 pub fn meetings(a: [f64; 2], b: [f64; 2], piece: &Piece) -> Vec<[f64; 2]> {

@@ -10,6 +10,9 @@ pub mod meeting;
 pub mod outline;
 pub mod partition;
 pub mod piece;
+pub mod point;
 pub mod portion;
 pub mod shape;
 pub mod specimen;
+
+pub use point::Point;

@@ -7,7 +7,8 @@
 use std::f64::consts::TAU;
 
 use super::crossings;
-use super::piece::{Piece, Point, bounds, distance, is_inside, minus, numbered, reversed};
+use super::piece::{Piece, is_inside, numbered, reversed};
+use super::point::{Point, bounds, distance, minus};
 use super::shape::Shape;
 use super::specimen;
 

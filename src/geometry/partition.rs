@@ -8,10 +8,9 @@ use std::collections::{HashMap, HashSet};
 
 use super::meeting::{crossings, on};
 use super::outline::{Outline, OutlineError, Place};
-use super::piece::{Piece, distance};
+use super::piece::Piece;
+use super::point::{Point, distance};
 use super::shape::Shape;
-
-type Point = [f64; 2];
 
 /// Lengths below this part of the body's size are none.
 const NOTHING: f64 = 1e-9;

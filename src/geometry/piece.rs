@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-pub(super) type Point = [f64; 2];
+use super::point::{Point, bounds, distance, minus};
 
 /// An edge or an arc, travelled with the shape on the left.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -215,19 +215,4 @@ fn is_in_segment(piece: &Piece, p: Point) -> bool {
     let right = off[0] * along[1] - off[1] * along[0];
     let is_whole = piece.from == piece.to;
     distance(p, arc.centre) < arc.radius && (is_whole || right * arc.sweep > 0.0)
-}
-
-pub(super) fn minus(a: Point, b: Point) -> Point {
-    [a[0] - b[0], a[1] - b[1]]
-}
-
-pub(super) fn distance(a: Point, b: Point) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
-}
-
-/// Lowest and highest coordinates of points.
-pub(super) fn bounds(points: impl IntoIterator<Item = Point>) -> (Point, Point) {
-    points.into_iter().fold(([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]), |(low, high), p| {
-        ([low[0].min(p[0]), low[1].min(p[1])], [high[0].max(p[0]), high[1].max(p[1])])
-    })
 }

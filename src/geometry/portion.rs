@@ -5,8 +5,7 @@ use std::f64::consts::TAU;
 
 use super::outline::{Outline, Place};
 use super::piece::{Arc, Piece};
-
-type Point = [f64; 2];
+use super::point::{Point, dot};
 
 /// A stretch of one piece of an outline.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -214,10 +213,6 @@ fn within_disc(piece: &Piece, centre: Point, radius: f64) -> Vec<[f64; 2]> {
     }
     let rest = (radius * radius - dot(apart, apart) - arc.radius * arc.radius) / 2.0;
     below(piece, apart, dot(apart, arc.centre) + rest)
-}
-
-fn dot(a: Point, b: Point) -> f64 {
-    a[0] * b[0] + a[1] * b[1]
 }
 
 /// Where the direction from the centre lies between two angles, counter-clockwise \[rad\].

@@ -1,6 +1,7 @@
 //! Regions of the plane from which a body is cut (the paper's samples and ASTM specimens).
 
 use super::piece::{Piece, is_inside};
+use super::point::{Point, bounds};
 use super::specimen::Specimen;
 
 /// A solid region \[length, world frame\]; its boundary belongs to it, within the tolerance given to
@@ -66,17 +67,10 @@ impl Shape {
         match self {
             Shape::Rectangle { min, max } => (*min, *max),
             Shape::Disc { centre: [x, y], radius: r } => ([x - r, y - r], [x + r, y + r]),
-            Shape::Polygon { vertices } => {
-                vertices.iter().fold(([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]), |(low, high), v| {
-                    ([low[0].min(v[0]), low[1].min(v[1])], [high[0].max(v[0]), high[1].max(v[1])])
-                })
+            Shape::Polygon { vertices } => bounds(vertices.iter().copied()),
+            Shape::Path { pieces } => {
+                bounds(pieces.iter().flat_map(|piece| <[Point; 2]>::from(piece.bounds())))
             }
-            Shape::Path { pieces } => pieces
-                .iter()
-                .map(Piece::bounds)
-                .fold(([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]), |(low, high), (l, h)| {
-                    ([0, 1].map(|k| l[k].min(low[k])), [0, 1].map(|k| h[k].max(high[k])))
-                }),
             Shape::Specimen(specimen) => specimen.bounds(),
             Shape::WithHoles { body, .. } => body.bounds(),
         }

@@ -5,7 +5,8 @@
 
 use std::f64::consts::TAU;
 
-use super::piece::{Arc, Piece, Point, reversed};
+use super::Point;
+use super::piece::{Arc, Piece, reversed};
 
 /// A dog-bone whose axis runs along y, centred on x = 0, from y = 0 at the lower grip.
 #[derive(Clone, Copy, Debug, PartialEq)]

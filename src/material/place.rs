@@ -2,8 +2,7 @@
 
 use super::cells::Cells;
 use crate::flock::vectors::{Vectors, distance};
-
-type Point = [f64; 2];
+use crate::geometry::point::{Point, dot, minus};
 
 /// The particles around a place, and shares with which they stand for it: linear fields are met exactly.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,14 +84,6 @@ fn shares(corners: &[Point], place: Point) -> Vec<f64> {
         (0..count).map(|k| (half_tangents[(k + count - 1) % count] + half_tangents[k]) / far[k]).collect();
     let whole: f64 = weights.iter().sum();
     weights.into_iter().map(|weight| weight / whole).collect()
-}
-
-fn minus(a: Point, b: Point) -> Point {
-    [a[0] - b[0], a[1] - b[1]]
-}
-
-fn dot(a: Point, b: Point) -> f64 {
-    a[0] * b[0] + a[1] * b[1]
 }
 
 #[cfg(test)]

@@ -27,6 +27,7 @@ use crate::flock::body::Body;
 use crate::flock::law::{Flock, MatrixWeights, Weights};
 use crate::flock::rules::{Corner, Mean, OWN, Rotation, Turn, patch_row};
 use crate::flock::vectors::Vectors;
+use crate::geometry::point::minus;
 
 /// Newton steps of one increment.
 const MOST_STEPS: usize = 16;
@@ -443,10 +444,6 @@ impl Newton<'_> {
         }
         Ok(())
     }
-}
-
-fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    [a[0] - b[0], a[1] - b[1]]
 }
 
 fn add(sum: &mut [f64; 2], [x, y]: [f64; 2]) {

@@ -33,6 +33,7 @@
 use super::ParticleState;
 use super::averaged::{self, PatchCell};
 use crate::flock::block::{Block, apply, inverse, plus, product, transposed};
+use crate::geometry::point::{cross, dot};
 
 /// The stiffness of a cell.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -286,14 +287,6 @@ fn place(turn: Turn, corner: Corner) -> [f64; 2] {
 
 fn quarter([x, y]: [f64; 2]) -> [f64; 2] {
     [-y, x]
-}
-
-fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
-    a[0] * b[0] + a[1] * b[1]
-}
-
-fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
-    a[0] * b[1] - a[1] * b[0]
 }
 
 #[cfg(test)]

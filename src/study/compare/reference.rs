@@ -9,13 +9,12 @@ use crate::fem::{
 };
 use crate::flock::rules::Rotation;
 use crate::flock::vectors::Vectors;
+use crate::geometry::Point;
 use crate::geometry::outline::Outline;
 use crate::geometry::partition::Partition;
 use crate::geometry::portion::Portion;
 use crate::material::elastic::{Constants, Elastic, Plane};
 use crate::material::outline_loads::Load;
-
-type Point = [f64; 2];
 
 /// Particles this part of the spacing outside the outline are still on it: they stand on it but for rounding.
 const OUTSIDE: f64 = 1e-3;

@@ -12,14 +12,13 @@ use super::supports::supports;
 use crate::continuum::equilibrium::solve_equilibrium;
 use crate::fem::{Effort, Holding};
 use crate::flock::vectors::{Vectors, distance};
+use crate::geometry::Point;
 use crate::geometry::outline::Outline;
 use crate::geometry::piece::Piece;
 use crate::geometry::portion::Portion;
 use crate::material::outline_loads::{Load, OutlineLoad};
 use crate::scene::{Scene, SceneError};
 use crate::solve::equilibrium::{Precision, Request};
-
-type Point = [f64; 2];
 
 /// Residual over load beyond which nothing of a solver's error is left to see.
 const TIGHT: f64 = 1e-10;

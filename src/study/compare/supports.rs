@@ -14,11 +14,10 @@ use crate::flock::region::Region;
 use crate::flock::role::Role;
 use crate::flock::vectors::distance;
 use crate::geometry::outline::Outline;
+use crate::geometry::point::{Point, bounds};
 use crate::geometry::portion::{Portion, Selection};
 use crate::material::cells::Cells;
 use crate::scene::{Scene, SceneError, SceneRegion};
-
-type Point = [f64; 2];
 
 /// Particles nearer to the outline than this part of the spacing are on it.
 const ON_OUTLINE: f64 = 1e-6;
@@ -165,12 +164,7 @@ impl Picked<'_> {
             SceneRegion::Known(known) => known,
         };
         let near = ON_OUTLINE * self.spacing();
-        let (min, max) = all
-            .iter()
-            .map(|&i| self.at(i))
-            .fold(([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]), |(low, high), p| {
-                ([0, 1].map(|k| p[k].min(low[k])), [0, 1].map(|k| p[k].max(high[k])))
-            });
+        let (min, max) = bounds(all.iter().map(|&i| self.at(i)));
         let has_cell = self.has_whole_cell(all);
         let is_outer = all.iter().all(|&i| self.outline.nearest(self.at(i)).1 <= near);
         let along = |selection: Selection| {

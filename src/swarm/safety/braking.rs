@@ -4,8 +4,9 @@
 //! members that brake divide the space between these ways, not between the members: [the module's docs](super)
 //! prove that a command then exists at every tick.
 
-use super::cell::{dot, length, shortened};
+use super::cell::{length, shortened};
 use super::filter::{Filter, Flags, Seen};
+use crate::geometry::point::dot;
 use crate::swarm::robots::DoubleIntegrator;
 
 /// Halvings of the interval between braking and the wanted velocity: a step is exact to one part in 2 to this power.

@@ -4,6 +4,8 @@
 //! Everything is relative to the member's own place, so that a half-plane whose offset is not
 //! negative contains the member, and a cell of such half-planes is never empty.
 
+use crate::geometry::point::dot;
+
 /// The points `x` with `normal . x <= offset` \[m\], relative to the member.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfPlane {
@@ -114,10 +116,6 @@ impl HalfPlane {
     fn shared(&self, reach: f64, share: f64) -> f64 {
         if self.offset < 0.0 { share * self.offset.max(-reach) } else { self.offset }
     }
-}
-
-pub fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
-    a[0] * b[0] + a[1] * b[1]
 }
 
 /// As `hypot`, without the call where the squares are in range.

@@ -7,7 +7,8 @@
 //! it took to give it up. The aim is projected onto the cell like any other: a detour cannot do harm.
 //! It finds the way round convex things, not out of a maze.
 
-use super::cell::{dot, length};
+use super::cell::length;
+use crate::geometry::point::dot;
 
 /// Conditions for the detour of a blocked member.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,8 +1,9 @@
 //! One member's part of a tick: its cell, and its step within it.
 
-use super::cell::{HalfPlane, dot, length, nearest, shortened};
+use super::cell::{HalfPlane, length, nearest, shortened};
 use super::deadlock::Tick;
 use super::filter::{Filter, Flags, Seen};
+use crate::geometry::point::dot;
 use crate::geometry::shape::segments_cross;
 
 /// A member's wanted way at this tick, and its reach.
