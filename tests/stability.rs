@@ -118,7 +118,7 @@ fn the_measured_factor_is_the_spectral_radius() {
         [(Parameter::Feedback, 0.02), (Parameter::Feedback, -0.5), (Parameter::Damping, 1.1)]
     {
         let run = growth(&subject, parameter, value, 10_000);
-        let spectrum = subject.with(parameter, value).radius();
+        let spectrum = subject.with(parameter, value).sweep().radius();
         assert!(run.settled && spectrum.converged, "{run:?} {spectrum:?}");
         assert!((run.per_step - spectrum.radius).abs() < 2e-3, "{run:?} {spectrum:?}");
     }

@@ -40,61 +40,28 @@ pub struct Ends {
     pub converged: bool,
 }
 
-/// Spectral radius of the sweep with these roles over the followers and the frame, in at most so many
-/// sweeps.
-///
-/// `None` where the sweep is not linear (weights that depend on distance, power means, corotation) or
-/// where no particle follows.
-pub fn spectral_radius(
-    flock: &Flock,
-    frame: Option<&Frame>,
-    roles: &[Role],
-    update: Update,
-    most_iterations: usize,
-) -> Option<SpectralRadius> {
-    let linear = LinearSweep::new(flock, frame, roles, update)?;
-    Some(linear.radius(Accuracy::Full, most_iterations))
-}
-
-/// [`spectral_radius`] as well as it takes to decide on which side of 1 it is, and about how far: to a
-/// hundredth of that, which far from 1 takes a fraction of the sweeps.
-pub fn radius_from_one(
-    flock: &Flock,
-    frame: Option<&Frame>,
-    roles: &[Role],
-    update: Update,
-    most_iterations: usize,
-) -> Option<SpectralRadius> {
-    let linear = LinearSweep::new(flock, frame, roles, update)?;
-    Some(linear.radius(Accuracy::FromOne(0.01), most_iterations))
-}
-
-/// Ends of the sweep's spectrum; `None` as for [`spectral_radius`].
-pub fn spectral_ends(
-    flock: &Flock,
-    frame: Option<&Frame>,
-    roles: &[Role],
-    update: Update,
-    most_iterations: usize,
-) -> Option<Ends> {
-    let linear = LinearSweep::new(flock, frame, roles, update)?;
-    let (found, iterations, converged) = linear.eigenvalues((Wanted::Ends, Accuracy::Full), most_iterations);
-    // One of them only where nothing could be found at all.
-    let (low, high) = (found[0].value, found[found.len() - 1].value);
-    let are_real = [low, high].iter().all(|v| v.im.abs() <= 1e-9 * low.norm().max(high.norm()));
-    Some(Ends { lowest: low.re, highest: high.re, are_real, iterations, converged })
-}
-
-/// The sweep on displacements.
-struct LinearSweep<'a> {
+/// A linear sweep with these roles, on the displacements of the followers and the frame.
+pub struct LinearSweep<'a> {
     flock: Flock,
     frame: Option<&'a Frame>,
-    roles: &'a [Role],
+    roles: Vec<Role>,
     sweep: Sweep,
+    /// Sweeps in which an eigenvalue has to be found.
+    most: usize,
 }
 
 impl<'a> LinearSweep<'a> {
-    fn new(flock: &Flock, frame: Option<&'a Frame>, roles: &'a [Role], update: Update) -> Option<Self> {
+    /// Eigenvalues of it are found in at most so many sweeps, `most`.
+    ///
+    /// `None` where the sweep is not linear (weights that depend on distance, power means, corotation) or
+    /// where no particle follows.
+    pub fn new(
+        flock: &Flock,
+        frame: Option<&'a Frame>,
+        roles: &[Role],
+        update: Update,
+        most: usize,
+    ) -> Option<Self> {
         let linear =
             matches!(flock.rule.mean, Mean::Barycentre | Mean::Material { rotation: Rotation::Small });
         if !linear || !roles.contains(&Role::Follower) {
@@ -107,15 +74,35 @@ impl<'a> LinearSweep<'a> {
         let rest = if poisson { flock.rest.clone() } else { None };
         let flock = Flock { reference, rest, forces: None, ..flock.clone() };
         let sweep = Sweep::compile(update, &flock, roles);
-        Some(Self { flock, frame, roles, sweep })
+        Some(Self { flock, frame, roles: roles.to_vec(), sweep, most })
     }
 
-    fn radius(&self, accuracy: Accuracy, most: usize) -> SpectralRadius {
-        let (found, iterations, converged) = self.eigenvalues((Wanted::Modulus, accuracy), most);
+    /// The spectral radius.
+    pub fn radius(&self) -> SpectralRadius {
+        self.radius_to(Accuracy::Full)
+    }
+
+    /// The spectral radius as well as it takes to decide on which side of 1 it is, and about how far: to a
+    /// hundredth of that, which far from 1 takes a fraction of the sweeps.
+    pub fn radius_from_one(&self) -> SpectralRadius {
+        self.radius_to(Accuracy::FromOne(0.01))
+    }
+
+    /// Ends of the spectrum.
+    pub fn ends(&self) -> Ends {
+        let (found, iterations, converged) = self.eigenvalues((Wanted::Ends, Accuracy::Full));
+        // One of them only where nothing could be found at all.
+        let (low, high) = (found[0].value, found[found.len() - 1].value);
+        let are_real = [low, high].iter().all(|v| v.im.abs() <= 1e-9 * low.norm().max(high.norm()));
+        Ends { lowest: low.re, highest: high.re, are_real, iterations, converged }
+    }
+
+    fn radius_to(&self, accuracy: Accuracy) -> SpectralRadius {
+        let (found, iterations, converged) = self.eigenvalues((Wanted::Modulus, accuracy));
         SpectralRadius { radius: found[0].value.norm(), iterations, converged }
     }
 
-    fn eigenvalues(&self, wanted: (Wanted, Accuracy), most: usize) -> (Vec<Ritz>, usize, bool) {
+    fn eigenvalues(&self, wanted: (Wanted, Accuracy)) -> (Vec<Ritz>, usize, bool) {
         let count = self.roles.len();
         // Of the body's own size where the reference is there, so that it does not swallow them.
         let unit = self.flock.rule.poisson.map_or(1.0, |poisson| poisson.half_width);
@@ -133,7 +120,7 @@ impl<'a> LinearSweep<'a> {
                 to[2 * i + 1] = (next.y[i] - base.y[i]) / unit;
             }
         };
-        let found = eigenvalues(&mut apply, self.start(), wanted, most);
+        let found = eigenvalues(&mut apply, self.start(), wanted, self.most);
         (found.eigenvalues, found.applications, found.converged)
     }
 

@@ -7,7 +7,7 @@ use flockform::continuum::run::{StopReason, run};
 use flockform::engine::Engine;
 use flockform::flock::role::Role;
 use flockform::flock::rules::{Feedback, FeedbackReference, Rule};
-use flockform::solve::spectrum::{SpectralRadius, spectral_radius};
+use flockform::solve::spectrum::{LinearSweep, SpectralRadius};
 
 use crate::scenes::{load, planned};
 
@@ -79,8 +79,8 @@ fn released(overrides: &[&str]) -> (Plan, Vec<Role>) {
 }
 
 fn radius_of(plan: &Plan, roles: &[Role]) -> SpectralRadius {
-    spectral_radius(&plan.setup.flock, plan.setup.body.frame.as_ref(), roles, plan.setup.update, 200_000)
-        .expect("linear")
+    let frame = plan.setup.body.frame.as_ref();
+    LinearSweep::new(&plan.setup.flock, frame, roles, plan.setup.update, 200_000).expect("linear").radius()
 }
 
 #[test]

@@ -19,7 +19,7 @@ use crate::flock::neighbourhood::Neighbours;
 use crate::flock::role::Role;
 use crate::flock::rules::Rule;
 use crate::flock::vectors::Vectors;
-use crate::solve::spectrum::{SpectralRadius, spectral_radius};
+use crate::solve::spectrum::{LinearSweep, SpectralRadius};
 use crate::sweep::Update;
 use nearest::{Unreachable, nearest};
 
@@ -160,7 +160,8 @@ pub fn settles(
         Weights::Scalar(weights.to_vec()),
     );
     let none = SpectralRadius { radius: 0.0, iterations: 0, converged: true };
-    let found = spectral_radius(&flock, None, &roles, Update::default(), MOST_SWEEPS).unwrap_or(none);
+    let sweep = LinearSweep::new(&flock, None, &roles, Update::default(), MOST_SWEEPS);
+    let found = sweep.map_or(none, |sweep| sweep.radius());
     // Followers that no leader reaches keep an error for ever: exactly one, found as one to rounding.
     if found.radius < 1.0 - 1e-9 {
         Ok(found)

@@ -136,56 +136,51 @@ fn is_settled(sizes: &[f64]) -> bool {
     (last - before).abs() <= 0.02 * (last - 1.0).abs()
 }
 
-/// Two values between which `f` first is over, with what it is there, in strides that double from `inside` on; `None`
-/// where it is over there already, or still is not when a stride would be longer than `longest`.
-pub(super) fn bracket<T: Copy>(
-    mut f: impl FnMut(f64) -> T,
-    is_over: impl Fn(T) -> bool,
+/// Two values between which `f` first is positive, with what it is there, in strides that double from `inside` on; `None`
+/// where it is positive there already, or still is not after thousands of strides.
+pub(super) fn bracket(
+    mut f: impl FnMut(f64) -> f64,
     (inside, toward): (f64, f64),
-    longest: f64,
-) -> Option<[(f64, T); 2]> {
+) -> Option<[(f64, f64); 2]> {
     let (mut low, mut stride) = ((inside, f(inside)), toward);
-    if is_over(low.1) {
+    if low.1 > 0.0 {
         return None;
     }
-    loop {
+    while stride.abs() <= 4096.0 * toward.abs() {
         let next = low.0 + stride;
         let next = (next, f(next));
-        if is_over(next.1) {
+        if next.1 > 0.0 {
             return Some([low, next]);
         }
         (low, stride) = (next, 2.0 * stride);
-        if stride.abs() > longest {
-            return None;
-        }
     }
+    None
 }
 
-/// The value at which growth begins, to `within`, between one at which the body comes back and one beyond it.
-/// `toward` is the direction to look in and the first stride; `None` where nothing grows for thousands of
+/// The value at which growth begins, to `within`, between one at which the body comes back and one beyond it. `from` is
+/// the first value, and the direction to look in with the first stride; `None` where nothing grows for thousands of
 /// strides. `progress` is called with each value before its run.
 pub fn find(
     subject: &Subject,
     parameter: Parameter,
-    (inside, toward): (f64, f64),
+    from: (f64, f64),
     (within, most_steps): (f64, usize),
     progress: &mut dyn FnMut(f64),
 ) -> Option<Found> {
     let mut runs = Vec::new();
-    let mut grows = |value: f64| {
+    let mut excess = |value: f64| {
         progress(value);
         let run = growth(subject, parameter, value, most_steps);
         runs.push(run);
-        run.grows()
+        run.per_step - 1.0
     };
-    let ends = bracket(&mut grows, |grows| grows, (inside, toward), 4096.0 * toward.abs())?;
-    let [mut low, mut high] = ends.map(|(value, _)| value);
+    let [mut low, mut high] = bracket(&mut excess, from)?.map(|(value, _)| value);
     while (high - low).abs() > 2.0 * within {
         let middle = 0.5 * (low + high);
         if middle == low || middle == high {
             break;
         }
-        *if grows(middle) { &mut high } else { &mut low } = middle;
+        *if excess(middle) > 0.0 { &mut high } else { &mut low } = middle;
     }
     let settled = [low, high].iter().all(|end| runs.iter().any(|run| run.value == *end && run.settled));
     Some(Found { value: 0.5 * (low + high), within: 0.5 * (high - low).abs(), settled, runs })

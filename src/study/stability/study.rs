@@ -113,8 +113,8 @@ pub fn run(load: Load<'_>, options: Options, progress: &mut dyn FnMut(&str)) -> 
 }
 
 fn linear(subject: &Subject, effort: Effort, progress: &mut dyn FnMut(&str)) -> Linear {
-    let here = subject.radius();
-    let bare = subject.with(Parameter::Feedback, 0.0).with(Parameter::Damping, 1.0).ends();
+    let here = subject.sweep().radius();
+    let bare = subject.with(Parameter::Feedback, 0.0).with(Parameter::Damping, 1.0).sweep().ends();
     let asked = [
         (Parameter::Feedback, Side::Lower),
         (Parameter::Feedback, Side::Upper),
@@ -153,7 +153,7 @@ fn threshold(
         Parameter::Feedback => 0.0,
         Parameter::Damping => 1.0,
     };
-    let margin = (subject.with(parameter, neutral).radius_from_one().radius - 1.0).abs();
+    let margin = (subject.with(parameter, neutral).sweep().radius_from_one().radius - 1.0).abs();
     let tolerance = (1e-3 * margin).max(1e-6);
     let steps = effort.steps(subject.particles());
     let from = start(subject, parameter, side);

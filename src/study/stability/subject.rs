@@ -8,7 +8,7 @@ use crate::engine::setup::Setup;
 use crate::flock::role::Role;
 use crate::flock::rules::{Feedback, FeedbackReference};
 use crate::scene::{Scene, SceneError};
-use crate::solve::spectrum::{Ends, SpectralRadius, radius_from_one, spectral_ends, spectral_radius};
+use crate::solve::spectrum::LinearSweep;
 use crate::sweep::Order;
 
 /// The parameter that is varied.
@@ -126,27 +126,10 @@ impl Subject {
         self.plan.setup.body.lattice.spacing()
     }
 
-    /// How its sweep grows or shrinks what is left of a displacement.
-    pub fn radius(&self) -> SpectralRadius {
-        let engine = self.engine();
-        let frame = self.plan.setup.body.frame.as_ref();
-        spectral_radius(engine.flock(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
-            .expect("linear, with followers")
-    }
-
-    /// The same, as accurate as distinguishing growth from decay needs.
-    pub fn radius_from_one(&self) -> SpectralRadius {
-        let engine = self.engine();
-        let frame = self.plan.setup.body.frame.as_ref();
-        radius_from_one(engine.flock(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
-            .expect("linear, with followers")
-    }
-
-    /// Ends of the spectrum of its sweep.
-    pub fn ends(&self) -> Ends {
-        let engine = self.engine();
-        let frame = self.plan.setup.body.frame.as_ref();
-        spectral_ends(engine.flock(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
+    /// Its sweep on displacements.
+    pub fn sweep(&self) -> LinearSweep<'_> {
+        let (engine, frame) = (self.engine(), self.plan.setup.body.frame.as_ref());
+        LinearSweep::new(engine.flock(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
             .expect("linear, with followers")
     }
 

@@ -67,13 +67,13 @@ pub fn predict(
     let mut converged = true;
     let mut excess = |value: f64| {
         progress(value);
-        let found = subject.with(parameter, value).radius_from_one();
+        let found = subject.with(parameter, value).sweep().radius_from_one();
         converged &= found.converged;
         // Bounded: a sequential sweep can grow by 1e20 a step, and false position would creep away from there.
         let excess = found.radius - 1.0;
         excess / (1.0 + excess.abs())
     };
-    let [low, high] = bracket(&mut excess, |excess| excess > 0.0, start(subject, parameter, side), 4096.0)?;
+    let [low, high] = bracket(&mut excess, start(subject, parameter, side))?;
     let value = crossing(&mut excess, low, high);
     Some(Predicted { value, closed_form: closed_form(subject, parameter, side), converged })
 }
@@ -108,7 +108,7 @@ pub fn closed_form(subject: &Subject, parameter: Parameter, side: Side) -> Optio
         return None;
     }
     let bare = subject.with(Parameter::Feedback, 0.0).with(Parameter::Damping, 1.0);
-    let ends = bare.ends();
+    let ends = bare.sweep().ends();
     if !(ends.are_real && ends.converged) {
         return None;
     }
@@ -149,7 +149,7 @@ fn stable_stretch(ends: &Ends, damping: f64, side: Side) -> Option<f64> {
 pub fn curve(subject: &Subject, parameter: Parameter, [low, high]: [f64; 2], points: usize) -> Vec<Radius> {
     let at = |k: usize| {
         let value = low + (high - low) * k as f64 / (points.max(2) - 1) as f64;
-        Radius { value, radius: subject.with(parameter, value).radius_from_one().radius }
+        Radius { value, radius: subject.with(parameter, value).sweep().radius_from_one().radius }
     };
     (0..points).map(at).collect()
 }

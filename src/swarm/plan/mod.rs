@@ -25,7 +25,7 @@ use crate::flock::vectors::distance;
 use crate::scene::SceneError;
 use crate::scene::swarm::raw::RawModel;
 use crate::scene::swarm::{Shape, Swarm};
-use crate::solve::spectrum::spectral_radius;
+use crate::solve::spectrum::LinearSweep;
 use crate::swarm::flight::Flight;
 pub use exactness::{Exactness, ManoeuvreError};
 use period_map::PeriodMap;
@@ -233,7 +233,8 @@ fn not_linear(formation: &Formation, swarm: &Swarm) -> Option<&'static str> {
 fn convergence(formation: &Formation, swarm: &Swarm) -> Option<Convergence> {
     let engine = formation.engine()?;
     let frame = engine.body().frame.as_ref();
-    let found = spectral_radius(engine.flock(), frame, engine.roles(), engine.update(), MOST_SWEEPS)?;
+    let sweep = LinearSweep::new(engine.flock(), frame, engine.roles(), engine.update(), MOST_SWEEPS)?;
+    let found = sweep.radius();
     let factor = found.radius.powf(swarm.raw.control.sweeps as f64);
     let halves = factor < 1.0;
     let half_life_s = halves.then(|| swarm.raw.control.period * half_life(factor));

@@ -94,7 +94,7 @@ fn stays(overrides: &[&str]) -> Result<Outcome, SceneError> {
 
 fn thresholds(overrides: &[&str]) -> Result<Outcome, SceneError> {
     let subject = Subject::of(&small(overrides)?)?;
-    let error = (subject.radius().radius - 1.0).abs();
+    let error = (subject.sweep().radius().radius - 1.0).abs();
     // A spectrum with the eigenvalue 1 has no threshold: an answer would be wrong.
     Ok(Outcome::Wrong {
         error: Some(error),

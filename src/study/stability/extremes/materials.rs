@@ -107,7 +107,7 @@ fn stress(overrides: &[&str]) -> Result<Outcome, SceneError> {
 /// The damping that the rule takes by itself lets nothing grow.
 fn damped(overrides: &[&str]) -> Result<Outcome, SceneError> {
     let subject = Subject::of(&small(overrides)?)?;
-    let radius = subject.radius();
+    let radius = subject.sweep().radius();
     let check = format!("spectral radius {:.6} of the sweep as damped by itself", radius.radius);
     let error = if radius.converged { (radius.radius - 1.0).max(0.0) } else { f64::NAN };
     Ok(Outcome::judged(error, 0.0, check))
