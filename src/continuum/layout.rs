@@ -398,7 +398,7 @@ fn body_of(scene: &Scene) -> Result<(Body, Neighbours), BodyError> {
 /// led by a truth that is not known, shape \[count\]. Only roles that hold from the start count.
 pub fn held(changes: &[RoleChange], body: &Body, step: f64) -> Vec<Option<[f64; 2]>> {
     let mut held = vec![None; body.count()];
-    for change in changes.iter().filter(|change| change.from <= 1 && change.when.is_none()) {
+    for change in changes.iter().filter(|change| change.is_at_once()) {
         for (which, &i) in change.particles.iter().enumerate().filter(|_| change.axis.is_none()) {
             let base = body.reference.get(i);
             held[i] = match (change.role, &change.motion) {
@@ -415,7 +415,7 @@ pub fn held(changes: &[RoleChange], body: &Body, step: f64) -> Vec<Option<[f64; 
 /// held altogether.
 pub fn held_components(changes: &[RoleChange], body: &Body, step: f64) -> Vec<HeldComponent> {
     let mut components: BTreeMap<(usize, usize), f64> = BTreeMap::new();
-    for change in changes.iter().filter(|change| change.from <= 1 && change.when.is_none()) {
+    for change in changes.iter().filter(|change| change.is_at_once()) {
         for (which, &i) in change.particles.iter().enumerate() {
             let Some(axis) = change.axis else {
                 components.retain(|(particle, _), _| *particle != i);

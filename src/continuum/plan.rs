@@ -7,7 +7,7 @@ use super::damping::along_outline;
 use super::layout::{Layout, Truth, held_components, no_particle, refuse_pieces};
 use super::parts::{Parting, agreed, require_connected};
 use super::{places, weights};
-use crate::engine::setup::{Conduct, RoleChange, Setup};
+use crate::engine::setup::{Conduct, RoleChange, Setup, of_first_roles};
 use crate::flock::action::{Action, ActionKind};
 use crate::flock::body::{Body, MOST_ENTRIES};
 use crate::flock::fracture::{Bonds, Ghosts};
@@ -252,7 +252,7 @@ fn make_cuts(setup: &mut Setup, scene: &Scene) {
 
 /// Roles without a condition that hold from the first step are those the body starts with.
 fn take_first_roles(setup: &mut Setup) {
-    let at_once = |change: &&RoleChange| change.from <= 1 && change.when.is_none() && change.axis.is_none();
+    let at_once = |change: &&RoleChange| change.is_at_once() && change.axis.is_none();
     for change in setup.changes.iter().filter(at_once) {
         for &i in &change.particles {
             setup.roles[i] = change.role;
@@ -278,9 +278,8 @@ fn require_listable(scene: &Scene, body: &Body) -> Result<(), SceneError> {
 fn ever_follow(body: &Body, changes: &[RoleChange]) -> Vec<bool> {
     let mut follows: Vec<bool> = body.is_frame.iter().map(|frame| !frame).collect();
     for change in changes.iter().filter(|change| change.axis.is_none()) {
-        let at_once = change.from <= 1 && change.when.is_none();
         for &i in &change.particles {
-            follows[i] = change.role == Role::Follower || (follows[i] && !at_once);
+            follows[i] = change.role == Role::Follower || (follows[i] && !change.is_at_once());
         }
     }
     follows
@@ -295,17 +294,7 @@ fn free_edge(scene: &Scene, layout: &Layout, loads: &[Load], held: &[[bool; 2]])
 
 /// Components that are led or clamped from the start, shape \[count\]\[x, y\].
 fn held_axes(body: &Body, changes: &[RoleChange]) -> Vec<[bool; 2]> {
-    let mut leads = vec![[false; 2]; body.count()];
-    for change in changes.iter().filter(|change| change.from <= 1 && change.when.is_none()) {
-        let is_led = change.role.is_led();
-        for &i in &change.particles {
-            match change.axis {
-                None => leads[i] = [is_led; 2],
-                Some(axis) => leads[i][axis as usize] = is_led,
-            }
-        }
-    }
-    leads
+    of_first_roles(changes, body.count(), |_, change| change.role.is_led())
 }
 
 /// A load on a follower needs a rule with a stiffness, and a body that cannot get away.

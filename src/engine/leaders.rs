@@ -1,12 +1,14 @@
 //! Roles that particles take on the way, and leaders under their programs.
 
+use serde::{Deserialize, Serialize};
+
 use super::Engine;
 use super::setup::RoleChange;
 use crate::flock::condition::Quantity;
 use crate::flock::vectors::distance;
 
 /// A particle under a leader's program.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Led {
     pub particle: usize,
     /// Which role change made it a leader, and its number among that change's particles.

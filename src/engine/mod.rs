@@ -147,7 +147,7 @@ impl Engine {
         engine.follow_ramp();
         // The plan has given the roles that hold from the start; their motions begin here.
         for change in 0..engine.changes.len() {
-            if engine.changes[change].from <= 1 && engine.changes[change].when.is_none() {
+            if engine.changes[change].is_at_once() {
                 let all: Vec<usize> = (0..engine.changes[change].particles.len()).collect();
                 match engine.changes[change].axis {
                     None => engine.start_leading(change, &all, 0),

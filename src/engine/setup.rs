@@ -61,6 +61,32 @@ pub struct RoleChange {
     pub motion: Option<Motion>,
 }
 
+impl RoleChange {
+    /// Whether the particles have the role before the first step.
+    pub fn is_at_once(&self) -> bool {
+        self.from <= 1 && self.when.is_none()
+    }
+}
+
+/// What `of` makes, for each component of each particle, of the change that gives it its role before the first step,
+/// the last one that names it, shape \[count\]\[x, y\].
+pub fn of_first_roles<T: Copy + Default>(
+    changes: &[RoleChange],
+    count: usize,
+    of: impl Fn(usize, &RoleChange) -> T,
+) -> Vec<[T; 2]> {
+    let mut last = vec![[T::default(); 2]; count];
+    for (k, change) in changes.iter().enumerate().filter(|(_, change)| change.is_at_once()) {
+        for &i in &change.particles {
+            match change.axis {
+                None => last[i] = [of(k, change); 2],
+                Some(axis) => last[i][axis as usize] = of(k, change),
+            }
+        }
+    }
+    last
+}
+
 /// How particles follow: the part of a setup that may change while a body is stepped.
 #[derive(Clone, Debug)]
 pub struct Conduct {

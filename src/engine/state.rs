@@ -27,7 +27,7 @@ pub struct EngineState<'a> {
     previous: Cow<'a, Vectors>,
     #[serde(with = "serde_impls::roles")]
     roles: Cow<'a, [Role]>,
-    leaders: Vec<Leading>,
+    leaders: Vec<Led>,
     guided: Cow<'a, [(usize, [f64; 2])]>,
     #[serde(with = "serde_impls::breaks")]
     breaks: Cow<'a, [Break]>,
@@ -35,16 +35,6 @@ pub struct EngineState<'a> {
     activity: Activity,
     /// Whether each bond is broken, eight to a byte; absent where none can break.
     broken: Option<Vec<u8>>,
-}
-
-/// A particle under a leader's program, as the engine keeps it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-struct Leading {
-    particle: usize,
-    change: usize,
-    which: usize,
-    since: usize,
-    base: [f64; 2],
 }
 
 /// A state that belongs to another plan.
@@ -64,13 +54,7 @@ impl<'a> EngineState<'a> {
     /// whole body.
     pub fn of(engine: &'a Engine) -> Self {
         let (owned, first) = (engine.body.owned(), engine.body.part.as_ref().map_or(0, |part| part.first));
-        let leading = |&Led { particle, change, which, since, base }: &Led| Leading {
-            particle: first + particle,
-            change,
-            which,
-            since,
-            base,
-        };
+        let leading = |led: &Led| Led { particle: first + led.particle, ..*led };
         let flock = &engine.flock;
         let packed = |byte: usize, bonds: &crate::flock::fracture::Bonds| {
             let all = 8 * byte..(8 * byte + 8).min(flock.neighbours.index.len());
@@ -150,13 +134,13 @@ impl<'a> EngineState<'a> {
             leaders.extend(state.leaders.iter().filter_map(|led| {
                 let particle = led.particle.checked_sub(first).filter(|i| exact.contains(i))?;
                 let which = setup.changes.get(led.change)?.particles.binary_search(&particle).ok()?;
-                Some(Leading { particle, which, ..*led })
+                Some(Led { particle, which, ..*led })
             }));
         }
         if known != exact.len() {
             return Err(WrongState { what: "particles", found: known, planned: exact.len() });
         }
-        leaders.sort_unstable_by_key(|led: &Leading| led.particle);
+        leaders.sort_unstable_by_key(|led: &Led| led.particle);
         let mut activity = pieces.first().map_or_else(Activity::default, |(_, state)| state.activity.clone());
         activity.forget();
         Ok(EngineState {
@@ -182,13 +166,11 @@ impl<'a> EngineState<'a> {
         engine.step = self.step;
         engine.conduct_until_now();
         self.require_fits(&engine)?;
-        let led =
-            |Leading { particle, change, which, since, base }| Led { particle, change, which, since, base };
         engine.follow_ramp();
         engine.present = self.present.into_owned();
         engine.previous = self.previous.into_owned();
         engine.roles = self.roles.into_owned();
-        engine.leaders = self.leaders.into_iter().map(led).collect();
+        engine.leaders = self.leaders;
         engine.led = engine.leaders.iter().map(|led| led.particle).collect();
         engine.guided = self.guided.into_owned();
         engine.breaks = self.breaks.into_owned();

@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::continuum::layout::Layout;
-use crate::engine::setup::RoleChange;
+use crate::engine::setup::{RoleChange, of_first_roles};
 use crate::fem::{Field, Holding, PlaneRegion, Support};
 use crate::flock::motion::Motion;
 use crate::flock::region::Region;
@@ -35,7 +35,7 @@ pub fn supports(
     step: f64,
 ) -> Result<Vec<Support<'static>>, SceneError> {
     let mut supports = Vec::new();
-    let holders = holders(changes, layout.body.count());
+    let holders = of_first_roles(changes, layout.body.count(), |k, change| holds(change).then_some(k));
     for (k, change) in changes.iter().enumerate().filter(|(_, change)| holds(change)) {
         let axes = change.axis.map_or([0, 1].as_slice(), |axis| &[0, 1][axis as usize..=axis as usize]);
         let is_own = |i: usize| axes.iter().any(|&axis| holders[i][axis] == Some(k));
@@ -57,28 +57,9 @@ pub fn supports(
     Ok(supports)
 }
 
-fn is_at_once(change: &RoleChange) -> bool {
-    change.from <= 1 && change.when.is_none()
-}
-
 fn holds(change: &RoleChange) -> bool {
     let is_known = change.role == Role::Clamped || (change.role == Role::Leader && change.motion.is_some());
-    is_at_once(change) && is_known
-}
-
-/// The entry that holds each component of each particle in the end, shape \[count\].
-fn holders(changes: &[RoleChange], count: usize) -> Vec<[Option<usize>; 2]> {
-    let mut holders = vec![[None; 2]; count];
-    for (k, change) in changes.iter().enumerate().filter(|(_, change)| is_at_once(change)) {
-        let holder = holds(change).then_some(k);
-        for &i in &change.particles {
-            match change.axis {
-                None => holders[i] = [holder; 2],
-                Some(axis) => holders[i][axis as usize] = holder,
-            }
-        }
-    }
-    holders
+    change.is_at_once() && is_known
 }
 
 /// The places at which an entry holds its particles \[length\].
