@@ -21,9 +21,8 @@ use crate::material::outline_loads::{self, Loader, OutlineLoad, Push};
 use crate::scene::{BodySource, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion};
 use crate::solve::linear::HeldComponent;
 
-/// Where finite elements have points of the body: their displacements \[length\] at these reference
-/// places \[length\], shape \[count\].
-pub type Truth<'a> = &'a dyn Fn(&Vectors) -> Vec<[f64; 2]>;
+/// A reference solution: displacements \[length\] of the body at these places of it at rest \[length\], shape \[count\].
+pub type ReferenceMotion<'a> = &'a dyn Fn(&Vectors) -> Vec<[f64; 2]>;
 
 /// A body laid out, before any particle moves.
 #[derive(Clone, Debug)]
@@ -131,19 +130,19 @@ impl Layout {
         Ok(Self { body, neighbours, cells, outline, partition })
     }
 
-    /// Role changes in the order in which they are written. Leaders led by the truth have no
-    /// motion where `truth` is not known.
+    /// Role changes in the order in which they are written. Leaders led by a reference
+    /// solution have no motion where that is not known.
     ///
     /// # Errors
     /// Names a region without particles, an id that does not exist, a table that misses a particle.
     pub fn role_changes(
         &self,
         scene: &Scene,
-        truth: Option<Truth<'_>>,
+        solution: Option<ReferenceMotion<'_>>,
     ) -> Result<Vec<RoleChange>, SceneError> {
         let change = |(k, entry): (usize, &RoleEntry)| {
             let particles = self.pick(scene, &format!("roles[{k}]"), &entry.region)?;
-            let motion = self.motion(scene, k, entry, &particles, truth)?;
+            let motion = self.motion(scene, k, entry, &particles, solution)?;
             let RoleEntry { role, axis, from, when, .. } = *entry;
             Ok(RoleChange { particles, role, axis, from, when, motion })
         };
@@ -360,7 +359,7 @@ impl Layout {
         entry_number: usize,
         entry: &RoleEntry,
         particles: &[usize],
-        truth: Option<Truth<'_>>,
+        solution: Option<ReferenceMotion<'_>>,
     ) -> Result<Option<Motion>, SceneError> {
         let reference = &self.body.reference;
         let (displacements, steps) = match &entry.motion {
@@ -376,8 +375,8 @@ impl Layout {
                 (displacements, *steps)
             }
             Some(LeaderMotion::Reference { steps }) => {
-                let Some(truth) = truth else { return Ok(None) };
-                (truth(&particles.iter().map(|&i| reference.get(i)).collect()), *steps)
+                let Some(solution) = solution else { return Ok(None) };
+                (solution(&particles.iter().map(|&i| reference.get(i)).collect()), *steps)
             }
         };
         Ok(Some(Motion::Table { displacements, steps: steps as f64 }))
@@ -395,7 +394,7 @@ fn body_of(scene: &Scene) -> Result<(Body, Neighbours), BodyError> {
 }
 
 /// Displacement \[length\] of each particle that does not follow, at `step`; `None` for followers and for leaders
-/// led by a truth that is not known, shape \[count\]. Only roles that hold from the start count.
+/// led by a reference solution that is not known, shape \[count\]. Only roles that hold from the start count.
 pub fn held(changes: &[RoleChange], body: &Body, step: f64) -> Vec<Option<[f64; 2]>> {
     let mut held = vec![None; body.count()];
     for change in changes.iter().filter(|change| change.is_at_once()) {

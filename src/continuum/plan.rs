@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::damping::along_outline;
-use super::layout::{Layout, Truth, held_components, no_particle, refuse_pieces};
+use super::layout::{Layout, ReferenceMotion, held_components, no_particle, refuse_pieces};
 use super::parts::{Parting, agreed, require_connected};
 use super::{places, weights};
 use crate::engine::setup::{Conduct, RoleChange, Setup, of_first_roles};
@@ -46,22 +46,27 @@ impl Plan {
     /// # Errors
     /// Names the key of the scene that cannot be laid out: an empty or disconnected body, a region
     /// without particles, a neighbourhood that does not fit the lattice, an id that does not exist, a
-    /// material that the cells cannot carry. Leaders led by the truth need [`Plan::with_truth`].
+    /// material that the cells cannot carry, leaders led by a reference solution, which [`Plan::of_layout`] takes.
     pub fn new(scene: &Scene) -> Result<Self, SceneError> {
-        if let Some(k) = scene.truth_led() {
+        if let Some(k) = scene.led_by_reference() {
             let help = "build with the feature `fem`, or give the leaders a motion of their own";
             let message = "the truth is not known: it takes finite elements to compute";
             return Err(scene.refuse(&format!("roles[{k}].motion"), message, help));
         }
-        Self::lay_out(scene, None)
+        Self::of_layout(scene, Layout::new(scene)?, None)
     }
 
-    /// Like [`Plan::new`], with leaders led by the truth where the scene has such.
+    /// The plan of a body laid out; leaders that the scene leads by a reference solution are led by this one.
     ///
     /// # Errors
     /// As [`Plan::new`].
-    pub fn with_truth(scene: &Scene, truth: Truth<'_>) -> Result<Self, SceneError> {
-        Self::lay_out(scene, Some(truth))
+    pub fn of_layout(
+        scene: &Scene,
+        layout: Layout,
+        reference: Option<ReferenceMotion<'_>>,
+    ) -> Result<Self, SceneError> {
+        let changes = layout.role_changes(scene, reference)?;
+        Self::of_roles(scene, layout, changes)
     }
 
     /// The part of this rank, planned by all ranks together; for scenes that [`laid_out_whole_for`](super::parts::laid_out_whole_for) has nothing against.
@@ -80,7 +85,7 @@ impl Plan {
                 return Err(layout.holds_none(scene, &format!("roles[{k}].region")));
             }
         }
-        let mut plan = agreed(scene, team, Self::of_layout(scene, layout, changes))?;
+        let mut plan = agreed(scene, team, Self::of_roles(scene, layout, changes))?;
         plan.agree_on_rest(team);
         Ok(plan)
     }
@@ -98,18 +103,10 @@ impl Plan {
     /// # Errors
     /// As [`Plan::new`], but for that.
     pub fn of_part_alone(scene: &Scene, parting: &Parting, rank: usize) -> Result<Self, SceneError> {
-        let layout = parting.lay_out(scene, rank)?;
-        let changes = layout.role_changes(scene, None)?;
-        Self::of_layout(scene, layout, changes)
+        Self::of_layout(scene, parting.lay_out(scene, rank)?, None)
     }
 
-    fn lay_out(scene: &Scene, truth: Option<Truth<'_>>) -> Result<Self, SceneError> {
-        let layout = Layout::new(scene)?;
-        let changes = layout.role_changes(scene, truth)?;
-        Self::of_layout(scene, layout, changes)
-    }
-
-    fn of_layout(scene: &Scene, layout: Layout, changes: Vec<RoleChange>) -> Result<Self, SceneError> {
+    fn of_roles(scene: &Scene, layout: Layout, changes: Vec<RoleChange>) -> Result<Self, SceneError> {
         let following = Following::new(scene, &layout, &changes)?;
         let probes = probes(scene, &layout.body)?;
         places::around(scene, layout.cells.as_ref(), &layout.body.reference)?;

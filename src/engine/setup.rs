@@ -57,7 +57,7 @@ pub struct RoleChange {
     pub from: usize,
     /// The condition that a particle must meet as well to take the role; none where all take it.
     pub when: Option<Condition>,
-    /// How leaders move; none for those led by a truth that is not known yet.
+    /// How leaders move; none for those led by a reference solution that is not known yet.
     pub motion: Option<Motion>,
 }
 

@@ -104,7 +104,7 @@ impl Scene {
     }
 
     /// Which role entry, if any, first leads particles to where finite elements have them.
-    pub fn truth_led(&self) -> Option<usize> {
+    pub fn led_by_reference(&self) -> Option<usize> {
         self.roles.iter().position(|entry| matches!(entry.motion, Some(LeaderMotion::Reference { .. })))
     }
 

@@ -20,6 +20,7 @@ use crate::fem::{Effort, FemError};
 use crate::flock::role::Role;
 use crate::flock::rules::Rotation;
 use crate::flock::vectors::Vectors;
+use crate::geometry::Point;
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
 use crate::scene::{LeaderMotion, Scene, SceneError};
@@ -105,9 +106,12 @@ pub fn truth_of(scene: &Scene, effort: &Effort) -> Result<SceneTruth, SceneError
 /// # Errors
 /// As [`truth_of`] and [`Plan::new`].
 pub fn plan(scene: &Scene) -> Result<Plan, SceneError> {
-    match scene.truth_led() {
+    match scene.led_by_reference() {
         None => Plan::new(scene),
-        Some(_) => plan_led_by(scene, &truth_of(scene, &Effort::default())?.truth),
+        Some(_) => {
+            let SceneTruth { truth, layout, .. } = truth_of(scene, &Effort::default())?;
+            Plan::of_layout(scene, layout, Some(&led_by(&truth)))
+        }
     }
 }
 
@@ -124,7 +128,7 @@ pub fn compare(
     require_comparable(scene)?;
     let truth = truth_of(scene, effort)?;
     let start = Stopwatch::start();
-    let plan = plan_led_by(scene, &truth.truth)?;
+    let plan = Plan::of_layout(scene, truth.layout.clone(), Some(&led_by(&truth.truth)))?;
     let cells = plan.setup.cells.clone().unwrap_or_else(|| Cells::of_body(&plan.setup.body));
     let outcome = run_to_equilibrium(scene, plan, watch)?;
     let time = start.elapsed();
@@ -160,16 +164,20 @@ fn is_orthogonal(scene: &Scene, engine: &Engine) -> bool {
     scene.is_fitted && scene.rotation() == Rotation::Small && (scene.loads.is_empty() || !is_moved)
 }
 
-/// The plan of a scene, its leaders led by this truth of its body or of a finer one; a leader that the truth
-/// does not know has no place to go.
+/// The plan of a scene, its leaders led by this truth of its body or of a finer one.
 ///
 /// # Errors
 /// As [`Plan::new`].
 pub fn plan_led_by(scene: &Scene, truth: &Reference) -> Result<Plan, SceneError> {
-    Plan::with_truth(scene, &|places| match truth.displacements_at(places) {
+    Plan::of_layout(scene, Layout::new(scene)?, Some(&led_by(truth)))
+}
+
+/// A leader that the truth does not know has no place to go.
+fn led_by(truth: &Reference) -> impl Fn(&Vectors) -> Vec<Point> + '_ {
+    |places| match truth.displacements_at(places) {
         Ok(found) => found.iter().collect(),
         Err(_) => vec![[f64::NAN; 2]; places.len()],
-    })
+    }
 }
 
 /// The reference covers one body in one equilibrium state.

@@ -2,11 +2,13 @@
 
 use serde::Serialize;
 
+use crate::continuum::layout::Layout;
 use crate::continuum::plan::Plan;
 use crate::engine::Engine;
 use crate::engine::setup::Setup;
 use crate::flock::role::Role;
 use crate::flock::rules::{Feedback, FeedbackReference};
+use crate::flock::vectors::Vectors;
 use crate::scene::{Scene, SceneError};
 use crate::solve::spectrum::LinearSweep;
 use crate::sweep::Order;
@@ -51,7 +53,8 @@ impl Subject {
     /// Names what makes the rule nonlinear, what changes it on the way, and a follower that no leader holds.
     pub fn of(scene: &Scene) -> Result<Self, SceneError> {
         // The places that the truth gives its leaders do not matter: they are held at rest.
-        let mut plan = Plan::with_truth(scene, &|places| vec![[0.0; 2]; places.len()])?;
+        let at_rest = |places: &Vectors| vec![[0.0; 2]; places.len()];
+        let mut plan = Plan::of_layout(scene, Layout::new(scene)?, Some(&at_rest))?;
         require_linear(scene, &plan)?;
         let mut changes = std::mem::take(&mut plan.setup.changes);
         changes.sort_by_key(|change| change.from);

@@ -16,6 +16,7 @@ use serde::Serialize;
 
 use super::Load;
 use crate::continuum::equilibrium::run_to_equilibrium;
+use crate::continuum::layout::Layout;
 use crate::continuum::plan::Plan;
 use crate::continuum::run::StopReason;
 use crate::flock::vectors::{Vectors, distance};
@@ -122,10 +123,10 @@ pub fn run(load: Load<'_>, scene: &Scene, progress: &mut dyn FnMut(&str)) -> Vec
 /// The plan of a scene; leaders that finite elements would lead are led by a strain of the body.
 ///
 /// # Errors
-/// As [`Plan::with_truth`].
+/// As [`Plan::new`].
 pub fn plan(scene: &Scene) -> Result<Plan, SceneError> {
     let strained = |places: &Vectors| places.iter().map(|[x, y]| [0.01 * x, -0.003 * y]).collect();
-    Plan::with_truth(scene, &strained)
+    Plan::of_layout(scene, Layout::new(scene)?, Some(&strained))
 }
 
 /// A body at the end of its scene.
