@@ -5,6 +5,7 @@ use super::leaders::Led as Leader;
 use crate::engine::setup::RoleChange;
 use crate::flock::law::Flock;
 use crate::flock::vectors::{Vectors, distance};
+use crate::geometry::Point;
 use crate::sweep::{Activity, Led};
 
 impl Engine {
@@ -28,11 +29,7 @@ impl Engine {
     /// Returns for each whether a particle is known to have moved farther in it than `farther` \[length\].
     pub fn advance_by(&mut self, count: usize, farther: Option<f64>) -> Vec<bool> {
         self.receive_halo(count);
-        let (leaders, changes, step) = (&self.leaders, &self.changes, self.step);
-        let place = |which: usize, level: usize| {
-            leaders[which].place(changes, step + level).expect("leaders have a motion")
-        };
-        let led = Led { particles: &self.led, place: &place };
+        let led = Led { particles: &self.led, places: &self.leaders_ahead(count) };
         let places = (&mut self.present, &mut self.previous);
         let frame = self.body.frame.as_ref();
         let moved = self.sweep.steps(&self.flock, frame, places, (count, led, farther), &mut self.activity);
@@ -59,15 +56,18 @@ impl Engine {
 
     /// How far from its reference place a leader gets in the next steps at most \[length\].
     pub fn leaders_reach(&self, steps: usize) -> f64 {
-        let farthest = |leader: &Leader| {
-            let reference = self.body.reference.get(leader.particle);
-            let far = |step: usize| {
-                leader.place(&self.changes, step).map_or(0.0, |place| distance(place, reference))
-            };
-            (self.step + 1..=self.step + steps).map(far).fold(0.0, f64::max)
-        };
-        let [farthest] = self.largest_of_parts([self.leaders.iter().map(farthest).fold(0.0, f64::max)]);
+        let places = self.leaders_ahead(steps);
+        let far = |(place, &particle): (&Point, &usize)| distance(*place, self.body.reference.get(particle));
+        let farthest = places.iter().zip(self.led.iter().cycle()).map(far).fold(0.0, f64::max);
+        let [farthest] = self.largest_of_parts([farthest]);
         farthest
+    }
+
+    /// Where leaders stand after each of the next steps \[length\], shape \[steps\]\[leaders\].
+    fn leaders_ahead(&self, steps: usize) -> Vec<Point> {
+        let to_come = self.step + 1..=self.step + steps;
+        let place = |step| move |led: &Leader| led.place(&self.changes, step).expect("leaders have a motion");
+        to_come.flat_map(|step| self.leaders.iter().map(place(step))).collect()
     }
 
     /// How far from the reference a step can take a particle if before it none is farther than 1, and how far if none has

@@ -45,13 +45,13 @@ const MOST_BANDS: usize = 8;
 pub struct Led<'a> {
     /// Their indices, ascending.
     pub particles: &'a [usize],
-    /// Where number `which` of them stands after so many steps, counted from 1 \[length\].
-    pub place: &'a (dyn Fn(usize, usize) -> [f64; 2] + Sync),
+    /// Where they stand after each step \[length\], shape \[steps\]\[particles\].
+    pub places: &'a [[f64; 2]],
 }
 
 impl Led<'_> {
     /// Nothing is led.
-    pub const NONE: Led<'static> = Led { particles: &[], place: &|_, _| [f64::NAN; 2] };
+    pub const NONE: Led<'static> = Led { particles: &[], places: &[] };
 }
 
 /// A frame that looks before the sweep, and where it stands around the body at rest \[length\].
@@ -440,12 +440,13 @@ fn place_led<T: Real>(
         return false;
     }
     let from = led.particles.partition_point(|&particle| particle < band.start);
+    let places = &led.places[(level - 1) * led.particles.len()..];
     let mut moved = false;
-    for (which, &particle) in led.particles.iter().enumerate().skip(from) {
+    for (&particle, place) in led.particles.iter().zip(places).skip(from) {
         if particle >= band.end {
             break;
         }
-        let place = T::of((led.place)(which, level)[axis]);
+        let place = T::of(place[axis]);
         next[particle - origin] = place;
         moved |= place.bits() != present[particle - origin].bits();
     }

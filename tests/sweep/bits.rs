@@ -74,8 +74,9 @@ impl Pulled {
         let mut next = present.clone();
         while done < STEPS {
             let count = most.min(STEPS - done);
-            let place = |which: usize, level: usize| self.place(which, done + level);
-            let led = Led { particles: &self.led, place: &place };
+            let place = |step: usize| (0..self.led.len()).map(move |which| self.place(which, step));
+            let places: Vec<[f64; 2]> = (done + 1..=done + count).flat_map(place).collect();
+            let led = Led { particles: &self.led, places: &places };
             let (frame, places) = (self.frame.as_ref(), (&mut present, &mut next));
             sweep.steps(&self.flock, frame, places, (count, led, None), &mut activity);
             done += count;

@@ -46,6 +46,12 @@ impl Case {
         self
     }
 
+    /// Those of all that are led in each of some steps.
+    fn places(&self, steps: impl IntoIterator<Item = usize>) -> Vec<[f64; 2]> {
+        let of_step = |step: usize| (0..self.led.len()).map(move |which| self.place(which, step));
+        steps.into_iter().flat_map(of_step).collect()
+    }
+
     fn place(&self, which: usize, step: usize) -> [f64; 2] {
         let [x, y] = self.flock.reference.get(self.led[which]);
         [x + 0.1 * step.min(9) as f64, y + 0.003 * (which * step.min(20)) as f64]
@@ -74,8 +80,7 @@ impl Case {
         let (mut activity, mut done) = (Activity::default(), 0);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         for &count in counts {
-            let place = |which: usize, level: usize| self.place(which, done + level);
-            let led = Led { particles: &self.led, place: &place };
+            let led = Led { particles: &self.led, places: &self.places(done + 1..=done + count) };
             let rest = self.flock.rest.as_ref().map(|rest| [&rest.x[..], &rest.y[..]]);
             let (rows, terms) = (sweep.rows.as_ref().expect("affine"), sweep.terms.of(&self.flock));
             let force = self.flock.forces.as_ref().map(|force| [&force.x[..], &force.y[..]]);
@@ -194,8 +199,7 @@ fn steps_report_whether_a_particle_moved_farther_than_the_limit() {
     let sweep = Sweep::compile(Update::default(), &case.flock, &case.roles);
     let mut present = Vectors::clone(&case.flock.reference);
     let mut next = present.clone();
-    let place = |which: usize, level: usize| case.place(which, if level < 3 { 0 } else { 1 });
-    let led = Led { particles: &case.led, place: &place };
+    let led = Led { particles: &case.led, places: &case.places([0, 0, 1, 1, 1]) };
     let places = (&mut present, &mut next);
     let farther = sweep.steps(&case.flock, None, places, (5, led, Some(0.09)), &mut Activity::default());
     // The leaders jump by 0.1 in the third; followers move by less.
