@@ -262,7 +262,7 @@ fn stepped(name: &str, overrides: &[&str], factor: f64) -> Vectors {
     let mut engine = Engine::new(plan.setup);
     let push = |k: usize| factor * scatter(k as u64);
     let disturbed = (0..engine.present().len()).map(|i| [push(2 * i), push(2 * i + 1)]).collect();
-    engine.settle(0, &disturbed);
+    engine.place_at_rest(0, &disturbed);
     (0..30).for_each(|_| engine.advance());
     engine.present().clone()
 }

@@ -74,7 +74,7 @@ fn words(scene: &Scene, compared: &Compared) -> String {
         Some(solved) => format!("{}, {} iterations", solved.solver, solved.iterations),
         None => format!("{} steps", outcome.engine.step()),
     };
-    let nodes = compared.truth.truth.nodes();
+    let nodes = compared.reference.solution.nodes();
     let mut words = format!(
         "{}: the rule by {way}, {end}{more}; truth of the shape on {nodes} nodes\n{}",
         scene.name, compared.comparison

@@ -251,7 +251,7 @@ fn refuse(scene: &Scene, error: &SolveError) -> SceneError {
 fn outcome(plan: Plan, solved: Solved) -> Outcome {
     let (step, spacing) = (plan.stop.steps, plan.setup.body.lattice.spacing());
     let mut engine = Engine::new(plan.setup);
-    engine.settle(step, &solved.displacement);
+    engine.place_at_rest(step, &solved.displacement);
     let residual = farthest_from_target(&engine) / spacing;
     let reason = overflow(&engine).map_or_else(|| reason(&solved), StopReason::Diverged);
     Outcome { engine, reason, residual, solved: Some(solved) }

@@ -313,7 +313,7 @@ impl Engine {
 
     /// Displaces all particles by `displacement` \[length\], shape \[count\], as if the body had come to rest
     /// there by `step`; frame points copy the particles that they serve.
-    pub fn settle(&mut self, step: usize, displacement: &Vectors) {
+    pub fn place_at_rest(&mut self, step: usize, displacement: &Vectors) {
         self.step = step;
         let reference = &self.body.reference;
         let place = |(here, by): ([f64; 2], [f64; 2])| [here[0] + by[0], here[1] + by[1]];
@@ -329,9 +329,9 @@ impl Engine {
     }
 
     /// Counts the way to the equilibrium that the body was put to, under the load that is on it now, as gone.
-    pub fn go_on(&mut self) {
+    pub fn extend_path(&mut self) {
         let mut path = self.path.take().unwrap_or_default();
-        path.go_on(self);
+        path.extend(self);
         self.path = Some(path);
     }
 

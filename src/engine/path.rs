@@ -42,7 +42,7 @@ impl Path {
     }
 
     /// Adds the way to where the engine's body is at rest now.
-    pub fn go_on(&mut self, engine: &Engine) {
+    pub fn extend(&mut self, engine: &Engine) {
         let Some(forces) = Forces::of(engine) else { return };
         let now = Acting {
             supports: forces.supports(engine),

@@ -33,7 +33,7 @@ pub struct ComparisonReport {
     /// How the rule's run ended.
     pub rule: RuleEnd,
     /// How fine the truth was solved.
-    pub truth: TruthSize,
+    pub truth: ReferenceSize,
     /// At the scene's `record.places`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub places: Vec<PlaceComparison>,
@@ -58,7 +58,7 @@ pub struct RuleEnd {
 
 /// The mesh of the truth.
 #[derive(Clone, Copy, Debug, Serialize, PartialEq)]
-pub struct TruthSize {
+pub struct ReferenceSize {
     /// Nodes of the finest of its meshes.
     pub nodes: usize,
     /// Number of meshes that it was solved on.
@@ -96,7 +96,7 @@ struct CellRow {
 impl ComparisonReport {
     /// The contents for a comparison of this scene.
     pub fn new(scene: &Scene, compared: &Compared) -> Self {
-        let (outcome, truth) = (&compared.outcome, &compared.truth.truth);
+        let (outcome, truth) = (&compared.outcome, &compared.reference.solution);
         Self {
             name: scene.name.clone(),
             title: scene.raw.title.clone(),
@@ -108,7 +108,7 @@ impl ComparisonReport {
                 solver: outcome.solved.as_ref().map(|solved| solved.solver.name()),
                 iterations: outcome.solved.as_ref().map(|solved| solved.iterations),
             },
-            truth: TruthSize {
+            truth: ReferenceSize {
                 nodes: truth.nodes(),
                 levels: truth.levels().len(),
                 stated_error: Some(truth.error().displacement).filter(|error| error.is_finite()),
@@ -144,7 +144,7 @@ pub fn write_comparison(
         roles: compared.outcome.engine.roles(),
         reference: &body.reference,
         rule: &compared.rule,
-        truth: &compared.truth.truth.displacement,
+        truth: &compared.reference.solution.displacement,
     };
     let stresses = figures::von_mises(&pair, &compared.von_mises_rule, &compared.von_mises_truth);
     written.extend(figures::write(&figures::overlay(&pair), folder, "overlay")?);
@@ -155,7 +155,7 @@ pub fn write_comparison(
 
 /// Reference place and both displacements of every particle \[length\].
 fn write_particles(folder: &OutputFolder, compared: &Compared) -> Result<PathBuf, ExportError> {
-    let (engine, truth) = (&compared.outcome.engine, &compared.truth.truth);
+    let (engine, truth) = (&compared.outcome.engine, &compared.reference.solution);
     let reference = &engine.body().reference;
     let rows = (0..reference.len()).map(|i| {
         let known = |values: &[f64]| truth.knows(i).then(|| values[i]);

@@ -134,10 +134,10 @@ pub(super) struct Comparison {
 
 impl Comparison {
     fn new(py: Python<'_>, scene: Scene, compared: Compared) -> PyResult<Self> {
-        let Compared { comparison, outcome, truth, cells, rule, von_mises_rule, von_mises_truth, .. } =
+        let Compared { comparison, outcome, reference, cells, rule, von_mises_rule, von_mises_truth, .. } =
             compared;
         let known = |i: usize| {
-            if truth.truth.knows(i) { truth.truth.displacement.get(i) } else { [f64::NAN; 2] }
+            if reference.solution.knows(i) { reference.solution.displacement.get(i) } else { [f64::NAN; 2] }
         };
         let shape = [cells.count()];
         Ok(Self {

@@ -3,7 +3,7 @@
 use flockform::fem::Effort;
 use flockform::flock::rules::Rotation;
 use flockform::study::compare::measures::{Comparison, Sides};
-use flockform::study::compare::run::{SceneTruth, truth_of};
+use flockform::study::compare::run::{SceneReference, reference_of};
 
 use crate::reference::beam_displacements;
 use crate::scenes::load;
@@ -12,8 +12,8 @@ use crate::support::*;
 /// Distance of the truth from the reference, by the measures of a comparison.
 fn distance_from_reference(name: &str, aspect: u32) -> Comparison {
     let scene = load(name, &[]);
-    let SceneTruth { truth, layout, elastic, time } =
-        truth_of(&scene, &Effort::default()).unwrap_or_else(|e| panic!("{e}"));
+    let SceneReference { solution: truth, layout, elastic, time } =
+        reference_of(&scene, &Effort::default()).unwrap_or_else(|e| panic!("{e}"));
     let (body, cells) = (&layout.body, layout.cells.as_ref().expect("has cells"));
     let follows: Vec<bool> = body.reference.x.iter().map(|&x| x > 10.5).collect();
     let known = beam_displacements(aspect, &body.reference);

@@ -269,6 +269,6 @@ fn the_edge_of_a_strip_bent_far_carries_the_stress_of_its_bending() {
 fn the_paper_s_beam_that_turns_is_held_against_a_truth_that_turns() {
     let found = compared("beam", &["rule.mean={ kind = \"material\", rotation = \"corotated\" }"]);
     println!("{}", found.comparison);
-    println!("{:?} {:?}", found.truth.truth.levels(), found.truth.truth.error());
+    println!("{:?} {:?}", found.reference.solution.levels(), found.reference.solution.error());
     assert!(found.comparison.displacement_rel_l2 < 0.005, "{}", found.comparison);
 }

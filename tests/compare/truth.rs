@@ -4,14 +4,14 @@ use std::ops::ControlFlow;
 
 use flockform::fem::Effort;
 use flockform::study::compare::measures::Comparison;
-use flockform::study::compare::run::{SceneTruth, compare, truth_of};
+use flockform::study::compare::run::{SceneReference, compare, reference_of};
 use flockform::study::compare::split::ErrorParts;
 
 use crate::scenes::load;
 use crate::support::*;
 
-fn truth(name: &str, overrides: &[&str]) -> SceneTruth {
-    truth_of(&load(name, overrides), &Effort::default()).unwrap_or_else(|e| panic!("{e}"))
+fn truth(name: &str, overrides: &[&str]) -> SceneReference {
+    reference_of(&load(name, overrides), &Effort::default()).unwrap_or_else(|e| panic!("{e}"))
 }
 
 const LATTICES: [&str; 6] = [
@@ -25,15 +25,15 @@ const LATTICES: [&str; 6] = [
 
 #[test]
 fn the_truth_is_the_same_on_every_lattice() {
-    let corner = |found: &SceneTruth| {
+    let corner = |found: &SceneReference| {
         let places = [[21.0, 10.0], [21.0, 21.0], [15.3, 12.1]].into_iter().collect();
-        found.truth.displacements_at(&places).unwrap_or_else(|e| panic!("{e}"))
+        found.solution.displacements_at(&places).unwrap_or_else(|e| panic!("{e}"))
     };
     let first = corner(&truth("beam-loaded", &[]));
     for lattice in LATTICES {
         let found = truth("beam-loaded", &[lattice]);
         assert!(largest_difference(&corner(&found), &first) < 1e-9, "{lattice}");
-        assert!(found.truth.error().displacement < 1e-4, "{lattice}: {:?}", found.truth.error());
+        assert!(found.solution.error().displacement < 1e-4, "{lattice}: {:?}", found.solution.error());
     }
 }
 
@@ -49,7 +49,7 @@ const COOK: [&str; 5] = [
 fn cooks_membrane_has_the_published_displacement_in_truth() {
     let found = truth("beam-loaded", &COOK);
     let middle = [[48.0, 52.0]].into_iter().collect();
-    let tip = found.truth.displacements_at(&middle).unwrap_or_else(|e| panic!("{e}")).get(0)[1];
+    let tip = found.solution.displacements_at(&middle).unwrap_or_else(|e| panic!("{e}")).get(0)[1];
     assert!((tip / 23.965 - 1.0).abs() < 3e-4, "{tip}");
 }
 
@@ -92,7 +92,7 @@ fn regions_of_whole_cells_hold_from_their_first_particle_to_their_last() {
         "roles=[{ region = { kind = \"box\", min = [9.0, 9.0], max = [13.4, 30.0] }, role = \"clamped\" }]";
     let found = truth("beam-loaded", &[block]);
     let places = [[12.9, 15.0], [13.0, 20.0], [13.3, 15.0]].into_iter().collect();
-    let moved = found.truth.displacements_at(&places).unwrap_or_else(|e| panic!("{e}"));
+    let moved = found.solution.displacements_at(&places).unwrap_or_else(|e| panic!("{e}"));
     assert!(moved.get(0)[0].hypot(moved.get(0)[1]) < 1e-12 && moved.get(1)[0].hypot(moved.get(1)[1]) < 1e-12);
     assert!(moved.get(2)[0].hypot(moved.get(2)[1]) > 1e-4, "{:?}", moved.get(2));
 }
@@ -105,7 +105,7 @@ fn particles_picked_one_by_one_hold_the_lines_between_them() {
         column.join(", ")
     );
     let (edge, by_id) = (truth("beam-loaded", &[]), truth("beam-loaded", &[&ids]));
-    let off = largest_difference(&edge.truth.displacement, &by_id.truth.displacement);
+    let off = largest_difference(&edge.solution.displacement, &by_id.solution.displacement);
     assert!(off < 1e-9, "{off}");
 }
 
@@ -118,8 +118,8 @@ fn planes_of_symmetry_hold_one_component() {
     let pull = "loads=[{ kind = \"traction\", region = { kind = \"edge\", side = \"right\" }, traction = [50.0, 0.0] }]";
     let found = truth("beam-loaded", &[rollers, pull]);
     let places = &found.layout.body.reference;
-    assert_eq!(found.truth.displacement.len(), places.len());
-    for (u, [x, y]) in found.truth.displacement.iter().zip(places.iter()) {
+    assert_eq!(found.solution.displacement.len(), places.len());
+    for (u, [x, y]) in found.solution.displacement.iter().zip(places.iter()) {
         let exact = [0.05 * (x - 10.0), -0.33 * 0.05 * (y - 10.0)];
         assert!((0..2).all(|k| (u[k] - exact[k]).abs() < 1e-9), "({x}, {y}): {u:?}, not {exact:?}");
     }

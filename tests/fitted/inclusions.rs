@@ -203,22 +203,22 @@ fn a_disc_with_a_stiff_core_converges_with_order_two_on_every_lattice() {
 #[test]
 fn the_truth_of_a_disc_with_a_stiff_core_is_lames() {
     use flockform::study::compare::reference::Effort;
-    use flockform::study::compare::run::truth_of;
+    use flockform::study::compare::run::reference_of;
     let (exact, q) = core();
     let scene = scene(&lattice("hexagonal", 1.0, 20.0), CORE).expect("a scene");
-    let found = truth_of(&scene, &Effort::default()).expect("a truth");
+    let found = reference_of(&scene, &Effort::default()).expect("a truth");
     let reference = &found.layout.body.reference;
     let (mut off, mut size) = (0.0, 0.0);
-    for (p, u) in reference.iter().zip(found.truth.displacement.iter()) {
+    for (p, u) in reference.iter().zip(found.solution.displacement.iter()) {
         let v = exact(p);
         off += (u[0] - v[0]).powi(2) + (u[1] - v[1]).powi(2);
         size += v[0] * v[0] + v[1] * v[1];
     }
-    let (off, stated) = ((off / size).sqrt(), found.truth.error().displacement);
+    let (off, stated) = ((off / size).sqrt(), found.solution.error().displacement);
     println!("off by {off:e}, stated {stated:e}");
     assert!(off < 1e-4 && off < 3.0 * stated, "off by {off:e}, stated {stated:e}");
     // Uniform in the core, two unequal stresses at its edge.
-    let stress = found.truth.stress_at(&[[1.0, 2.0], [3.0, 0.5]].into_iter().collect()).expect("inside");
+    let stress = found.solution.stress_at(&[[1.0, 2.0], [3.0, 0.5]].into_iter().collect()).expect("inside");
     assert!(stress.iter().all(|s| (s.von_mises() / q - 1.0).abs() < 1e-3), "{stress:?} {q}");
 }
 

@@ -57,9 +57,9 @@ pub(super) fn settle_each(
                 break;
             }
         };
-        outcome.engine.settle(n + 1, &solved.displacement);
+        outcome.engine.place_at_rest(n + 1, &solved.displacement);
         outcome.engine.set_load_factor(part);
-        outcome.engine.go_on();
+        outcome.engine.extend_path();
         outcome.residual = farthest_from_target(&outcome.engine) / spacing;
         outcome.reason = overflow(&outcome.engine).map_or_else(|| reason(&solved), StopReason::Diverged);
         outcome.solved = Some(solved);

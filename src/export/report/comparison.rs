@@ -29,7 +29,7 @@ pub fn write(
     compared: &Compared,
     report: &ComparisonReport,
 ) -> Result<PathBuf, ExportError> {
-    let truth = &compared.truth.truth;
+    let truth = &compared.reference.solution;
     let known = |i: usize| if truth.knows(i) { truth.displacement.get(i) } else { [f64::NAN; 2] };
     let truth: Vectors = (0..compared.rule.len()).map(known).collect();
     // The frame is scaffolding of the rule, of which the truth has none.

@@ -117,7 +117,7 @@ impl Frames {
     }
 
     /// Goes on from frames that were kept at an interval before.
-    pub fn go_on(&mut self, kept: Vec<Frame>, interval: usize) {
+    pub fn resume(&mut self, kept: Vec<Frame>, interval: usize) {
         (self.kept, self.interval) = (kept, interval);
     }
 

@@ -140,7 +140,7 @@ impl RunRecorder {
     ) -> &'a mut Self {
         let recorder = recorder.get_or_insert_with(|| Self::new(engine));
         if let Some(AnimationState { frames, interval, first_roles, roles, changes }) = earlier.take() {
-            recorder.frames.go_on(frames.into_owned(), interval);
+            recorder.frames.resume(frames.into_owned(), interval);
             (recorder.first_roles, recorder.roles, recorder.changes) = (first_roles, roles, changes);
         }
         recorder

@@ -127,7 +127,7 @@ pub(super) fn validate(
     let spacing = lattice.spacing();
     check_present_neighbours(&raw, refuse)?;
     material::check_rule(&raw, refuse)?;
-    check_truth(&raw, refuse)?;
+    check_reference(&raw, refuse)?;
     let elastic = raw.material.as_ref().map(|raw| material::elastic(raw, "material", refuse)).transpose()?;
     let inclusions = material::inclusions(&raw, elastic.as_ref(), refuse)?;
     let farthest = crate::scene::farthest_seeing(elastic.as_ref(), &inclusions);
@@ -378,7 +378,7 @@ fn check_present_neighbours(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), Sc
 }
 
 /// Leaders led by the truth need a material to compute it for.
-fn check_truth(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
+fn check_reference(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
     let led = raw.roles.iter().position(|entry| matches!(entry.motion, Some(RawMotion::Reference { .. })));
     match led {
         Some(k) if raw.material.is_none() => Err(refuse(

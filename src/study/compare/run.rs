@@ -28,9 +28,9 @@ use crate::solve::stopwatch::Stopwatch;
 
 /// The truth of a scene's body in its material, under its loads, clamps and leaders.
 #[derive(Clone, Debug)]
-pub struct SceneTruth {
+pub struct SceneReference {
     /// True displacements, at the particles and everywhere else.
-    pub truth: Reference,
+    pub solution: Reference,
     /// The body whose particles are asked for.
     pub layout: Layout,
     /// The material of the scene.
@@ -47,7 +47,7 @@ pub struct Compared {
     /// How the rule's run ended.
     pub outcome: Outcome,
     /// The reference that the rule is compared with.
-    pub truth: SceneTruth,
+    pub reference: SceneReference,
     /// Cells over which stress and energy are taken.
     pub cells: Cells,
     /// Displacements by the rule \[length\], shape \[particles\]; the true ones are the truth's.
@@ -67,7 +67,7 @@ pub struct Compared {
 /// # Errors
 /// Names the key of the scene for which there is no truth: no material, a body without an outline, a body that nothing
 /// holds, a leader outside the shape.
-pub fn truth_of(scene: &Scene, effort: &Effort) -> Result<SceneTruth, SceneError> {
+pub fn reference_of(scene: &Scene, effort: &Effort) -> Result<SceneReference, SceneError> {
     let start = Stopwatch::start();
     let layout = Layout::new(scene)?;
     let Some(elastic) = scene.material else { return Err(without_material(scene)) };
@@ -96,21 +96,21 @@ pub fn truth_of(scene: &Scene, effort: &Effort) -> Result<SceneTruth, SceneError
         supports,
         loads: &loads,
     };
-    let truth = Reference::solve(setting, effort).map_err(|error| refused(scene, &error))?;
-    require_known(scene, &truth, &changes)?;
-    Ok(SceneTruth { truth, layout, elastic, time: start.elapsed() })
+    let solution = Reference::solve(setting, effort).map_err(|error| refused(scene, &error))?;
+    require_known(scene, &solution, &changes)?;
+    Ok(SceneReference { solution, layout, elastic, time: start.elapsed() })
 }
 
 /// The plan of a scene, its leaders led by the truth where the scene asks for that.
 ///
 /// # Errors
-/// As [`truth_of`] and [`Plan::new`].
+/// As [`reference_of`] and [`Plan::new`].
 pub fn plan(scene: &Scene) -> Result<Plan, SceneError> {
     match scene.led_by_reference() {
         None => Plan::new(scene),
         Some(_) => {
-            let SceneTruth { truth, layout, .. } = truth_of(scene, &Effort::default())?;
-            Plan::of_layout(scene, layout, Some(&led_by(&truth)))
+            let SceneReference { solution, layout, .. } = reference_of(scene, &Effort::default())?;
+            Plan::of_layout(scene, layout, Some(&led_by(&solution)))
         }
     }
 }
@@ -126,36 +126,46 @@ pub fn compare(
     watch: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>,
 ) -> Result<Compared, SceneError> {
     require_comparable(scene)?;
-    let truth = truth_of(scene, effort)?;
+    let truth = reference_of(scene, effort)?;
     let start = Stopwatch::start();
-    let plan = Plan::of_layout(scene, truth.layout.clone(), Some(&led_by(&truth.truth)))?;
+    let plan = Plan::of_layout(scene, truth.layout.clone(), Some(&led_by(&truth.solution)))?;
     let cells = plan.setup.cells.clone().unwrap_or_else(|| Cells::of_body(&plan.setup.body));
     let outcome = run_to_equilibrium(scene, plan, watch)?;
     let time = start.elapsed();
 
     let engine = &outcome.engine;
     let rule: Vectors = (0..engine.body().count()).map(|i| engine.displacement(i)).collect();
-    let followed = |(i, &role): (usize, &Role)| role == Role::Follower && truth.truth.knows(i);
+    let followed = |(i, &role): (usize, &Role)| role == Role::Follower && truth.solution.knows(i);
     let follows: Vec<bool> = engine.roles().iter().enumerate().map(followed).collect();
-    let (elastic, known) = (&truth.elastic, &truth.truth.displacement);
+    let (elastic, known) = (&truth.elastic, &truth.solution.displacement);
     let rotation = scene.rotation();
     let sides = Sides { cells: &cells, elastic, rotation, rule: &rule, truth: known, follows: &follows };
     let mut comparison = Comparison::of(&sides)
         .map_err(|shape| scene.refuse("lattice", shape.to_string(), "use a lattice less slender"))?;
-    let energy = truth.truth.strain_energy();
+    let energy = truth.solution.strain_energy();
     comparison.strain_energy_truth = Some(energy);
     comparison.energy_norm_rel = (is_orthogonal(scene, engine) && !cells.average_dilatations(elastic))
         .then(|| energy_norm(comparison.strain_energy_rule, energy));
     comparison.seconds_rule = time.as_secs_f64();
     comparison.seconds_truth = truth.time.as_secs_f64();
-    comparison.truth_stated_rel_l2 = Some(truth.truth.error().displacement).filter(|error| error.is_finite());
+    comparison.truth_stated_rel_l2 =
+        Some(truth.solution.error().displacement).filter(|error| error.is_finite());
     comparison.parts = ErrorParts::of(scene, &truth, &rule, &follows)?;
     let von_mises_rule = von_mises(&cells, elastic, &rule, rotation);
     let von_mises_truth = von_mises(&cells, elastic, known, rotation);
     let stresses = Stresses::at_present(engine, elastic).filter(|_| !scene.record.places.is_empty());
     let at_places = stresses.map_or_else(Vec::new, |stresses| at_places(scene, engine, &stresses));
-    let places = compare_places(at_places, &truth.truth).map_err(|error| refused(scene, &error))?;
-    Ok(Compared { comparison, outcome, truth, cells, rule, von_mises_rule, von_mises_truth, places })
+    let places = compare_places(at_places, &truth.solution).map_err(|error| refused(scene, &error))?;
+    Ok(Compared {
+        comparison,
+        outcome,
+        reference: truth,
+        cells,
+        rule,
+        von_mises_rule,
+        von_mises_truth,
+        places,
+    })
 }
 
 /// Whether energies tell the error: those of a body that loads alone or moved supports alone drive, under small rotations.

@@ -7,7 +7,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::reference::{Reference, Setting};
-use super::run::{SceneTruth, plan_led_by, refused};
+use super::run::{SceneReference, plan_led_by, refused};
 use super::supports::supports;
 use crate::continuum::equilibrium::solve_equilibrium;
 use crate::fem::{Effort, Holding};
@@ -45,13 +45,13 @@ impl ErrorParts {
     /// Names what in the scene has no plan; a part that cannot be computed is left out.
     pub fn of(
         scene: &Scene,
-        truth: &SceneTruth,
+        truth: &SceneReference,
         rule: &Vectors,
         follows: &[bool],
     ) -> Result<Self, SceneError> {
-        let own = equilibrium(scene, &truth.truth);
-        let cells = truth_of_cells(scene, truth)?;
-        let known = &truth.truth.displacement;
+        let own = equilibrium(scene, &truth.solution);
+        let cells = reference_of_cells(scene, truth)?;
+        let known = &truth.solution.displacement;
         let apart = |a: &Vectors, b: &Vectors| {
             let (mut off, mut size) = (0.0, 0.0);
             for i in (0..follows.len()).filter(|&i| follows[i]) {
@@ -78,14 +78,14 @@ fn equilibrium(scene: &Scene, truth: &Reference) -> Option<Vectors> {
 }
 
 /// The truth of the shape that the cells have; the same where that is the shape itself.
-fn truth_of_cells(scene: &Scene, truth: &SceneTruth) -> Result<Option<Vectors>, SceneError> {
+fn reference_of_cells(scene: &Scene, truth: &SceneReference) -> Result<Option<Vectors>, SceneError> {
     let layout = &truth.layout;
     let (Some(outline), Some(cells)) = (&layout.outline, &layout.cells) else { return Ok(None) };
     let reference = &layout.body.reference;
     let Ok(of_cells) = cells.outline(reference) else { return Ok(None) };
     let agrees = |a: f64, b: f64| (a - b).abs() <= 1e-9 * b;
     if agrees(of_cells.area(), outline.area()) && agrees(of_cells.length(), outline.length()) {
-        return Ok(Some(truth.truth.displacement.clone()));
+        return Ok(Some(truth.solution.displacement.clone()));
     }
     // Edges of inclusions that end on the outline do not end on that of the cells.
     if of_cells.pieces().count() > MOST_SIDES || layout.partition.is_some() {

@@ -86,7 +86,7 @@ pub fn growth(subject: &Subject, parameter: Parameter, value: f64, most_steps: u
     let spacing = subject.spacing();
     let push = |k: usize| if follows(k / 2) { 0.25 * spacing * scatter(k as u64) } else { 0.0 };
     let disturbed: Vectors = (0..subject.particles()).map(|i| [push(2 * i), push(2 * i + 1)]).collect();
-    engine.settle(0, &disturbed);
+    engine.place_at_rest(0, &disturbed);
     let mut sizes = vec![size(engine.present(), &engine.body().reference, spacing)];
     let mut settled = false;
     while sizes.len() <= most_steps && !settled {

@@ -14,7 +14,7 @@ use crate::scene::raw::{RawMean, RawRegion};
 use crate::scene::{Scene, SceneError};
 use crate::solve::equilibrium::{Precision, Request};
 use crate::study::compare::reference::Effort;
-use crate::study::compare::run::{SceneTruth, plan_led_by, truth_of};
+use crate::study::compare::run::{SceneReference, plan_led_by, reference_of};
 
 /// Halvings tried before giving up.
 const MOST_HALVINGS: u32 = 5;
@@ -96,7 +96,7 @@ struct Body<'a> {
     /// Whether the scene leaves them open.
     is_open: [bool; 2],
     scene: Scene,
-    truth: SceneTruth,
+    truth: SceneReference,
 }
 
 /// A body at rest: how far it is from the truth, the truth's own error included \[1\].
@@ -112,13 +112,13 @@ impl<'a> Body<'a> {
         let overrides = body_overrides(scene, RuleChoice::Material, part);
         let scene = load(&overrides)?;
         let effort = Effort { target: (OF_TRUTH * accuracy).min(1e-3), ..Effort::default() };
-        let truth = truth_of(&scene, &effort)?;
-        let own = truth.truth.error().displacement;
+        let truth = reference_of(&scene, &effort)?;
+        let own = truth.solution.error().displacement;
         if own > 0.5 * accuracy {
             let message = format!(
                 "the truth itself is not known so well: on {} nodes the truth states an error of {:.4} % of its own, and where \
                  single points hold or push a body it always will",
-                truth.truth.nodes(),
+                truth.solution.nodes(),
                 100.0 * own
             );
             let help = "hold and push edges instead of points, or ask for less";
@@ -135,10 +135,11 @@ impl<'a> Body<'a> {
     fn solve(&self, more: &[String]) -> Result<Solved, SceneError> {
         let scene = (self.load)(&[&self.overrides, more].concat())?;
         let request = scene.equilibrium.map(|asked| asked.request).unwrap_or_default();
-        let outcome: Outcome = solve_equilibrium(&scene, &request, plan_led_by(&scene, &self.truth.truth)?)?;
-        let own = self.truth.truth.error().displacement;
+        let outcome: Outcome =
+            solve_equilibrium(&scene, &request, plan_led_by(&scene, &self.truth.solution)?)?;
+        let own = self.truth.solution.error().displacement;
         let follows = outcome.engine.roles().contains(&Role::Follower);
-        let error = match error_of(&outcome, &self.truth.truth) {
+        let error = match error_of(&outcome, &self.truth.solution) {
             Some(error) => error + own,
             // Without followers there is nothing to be wrong; else some are where the truth is not.
             None if follows => f64::INFINITY,

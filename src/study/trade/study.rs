@@ -13,7 +13,7 @@ use crate::scene::{Scene, SceneError};
 use crate::solve::stopwatch::Stopwatch;
 use crate::study::compare::reference::Effort;
 use crate::study::compare::reference::Reference;
-use crate::study::compare::run::{SceneTruth, plan_led_by, truth_of};
+use crate::study::compare::run::{SceneReference, plan_led_by, reference_of};
 
 /// The outcome of a setting.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -77,20 +77,20 @@ pub type Load<'a> = &'a dyn Fn(&[String]) -> Result<Scene, SceneError>;
 /// Whatever keeps the scene from having a truth; a setting that is refused is part of the study.
 pub fn run(load: Load<'_>, grid: &Grid, progress: &mut dyn FnMut(&Setting)) -> Result<Study, SceneError> {
     let scene = load(&[])?;
-    let truth = finest_truth(load, &scene, grid)?;
+    let truth = finest_reference(load, &scene, grid)?;
     let mut study = Study {
         name: scene.name.clone(),
         title: scene.raw.title.clone(),
-        truth_nodes: truth.truth.nodes(),
+        truth_nodes: truth.solution.nodes(),
         truth_seconds: truth.time.as_secs_f64(),
-        truth_stated_error: Some(truth.truth.error().displacement).filter(|error| error.is_finite()),
+        truth_stated_error: Some(truth.solution.error().displacement).filter(|error| error.is_finite()),
         repeats: grid.repeats,
         points: Vec::new(),
     };
     for rule in RuleChoice::ALL {
         for &spacing in &grid.spacings {
             let overrides = body_overrides(&scene, rule, spacing);
-            let particles = match load(&overrides).and_then(|scene| plan_led_by(&scene, &truth.truth)) {
+            let particles = match load(&overrides).and_then(|scene| plan_led_by(&scene, &truth.solution)) {
                 Ok(plan) if plan.count() <= grid.max_particles => plan.count(),
                 Ok(_) => continue,
                 Err(error) => {
@@ -104,7 +104,7 @@ pub fn run(load: Load<'_>, grid: &Grid, progress: &mut dyn FnMut(&Setting)) -> R
                     overrides.iter().cloned().chain(solver_overrides(&setting)).collect();
                 study.points.push(measure(
                     &load(&overrides)?,
-                    &truth.truth,
+                    &truth.solution,
                     setting,
                     particles,
                     grid.repeats,
@@ -116,19 +116,19 @@ pub fn run(load: Load<'_>, grid: &Grid, progress: &mut dyn FnMut(&Setting)) -> R
 }
 
 /// The truth of the finest body that is within bounds.
-fn finest_truth(load: Load<'_>, scene: &Scene, grid: &Grid) -> Result<SceneTruth, SceneError> {
+fn finest_reference(load: Load<'_>, scene: &Scene, grid: &Grid) -> Result<SceneReference, SceneError> {
     let mut spacings = grid.spacings.clone();
     spacings.sort_by(f64::total_cmp);
-    let fits = |truth: &SceneTruth| truth.layout.body.count() <= grid.max_particles;
+    let fits = |truth: &SceneReference| truth.layout.body.count() <= grid.max_particles;
     for &spacing in spacings.iter().filter(|&&spacing| spacing <= 1.0) {
         let finer = load(&body_overrides(scene, RuleChoice::Material, spacing));
         if let Some(truth) =
-            finer.ok().and_then(|scene| truth_of(&scene, &Effort::default()).ok()).filter(fits)
+            finer.ok().and_then(|scene| reference_of(&scene, &Effort::default()).ok()).filter(fits)
         {
             return Ok(truth);
         }
     }
-    truth_of(scene, &Effort::default())
+    reference_of(scene, &Effort::default())
 }
 
 fn refused(rule: RuleChoice, spacing: f64, error: &SceneError) -> Point {
