@@ -6,12 +6,11 @@ use super::plan::Plan;
 use crate::engine::Engine;
 use crate::engine::movement::Movement;
 use crate::engine::observer::{EachStep, Observer};
-use crate::engine::several::Reach;
+use crate::engine::several::StepBatch;
 use crate::engine::shared::{Agreed, NotShared};
 use crate::engine::state::{EngineState, WrongState};
 use crate::flock::law::Weights;
 use crate::flock::rules::{FeedbackReference, Mean};
-use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
 use crate::scene::{Scene, SceneError, Stop};
 use crate::solve::equilibrium::Solved;
@@ -245,9 +244,7 @@ fn run_loop(
         if look <= engine.step() {
             look = observer.next(engine.step()).clamp(engine.step() + 1, stop.steps);
         }
-        let most = look - engine.step();
-        batch.advance(&mut engine, most);
-        let movement = engine.movement();
+        let movement = batch.advance(&mut engine, look);
         if !(movement.is_finite && movement.largest_displacement <= *divergence_ratio) {
             engine.gather();
         }
@@ -255,7 +252,6 @@ fn run_loop(
             engine.undo_step();
             break StopReason::Diverged(divergence);
         }
-        batch.displacement = movement.largest_displacement;
         residual = movement.largest_move;
         if engine.step() == look || settled(residual, &engine) {
             engine.gather();
@@ -264,70 +260,6 @@ fn run_loop(
     };
     engine.gather();
     Outcome { engine, reason, residual, solved: None }
-}
-
-/// Takes as many steps at once as can be known to hold neither the last one nor a divergence.
-struct StepBatch {
-    tolerance: Option<f64>,
-    /// Largest distance from the reference place over the spacing \[1\]: that of any particle now, and the bound on it.
-    displacement: f64,
-    bound: f64,
-    /// How far a step takes particles from the reference, if that is known.
-    reach: Option<Reach>,
-    /// Where a stride began, if it may have gone too far.
-    start: Vectors,
-    /// Steps to be taken one at a time.
-    single_steps: usize,
-}
-
-impl StepBatch {
-    fn new(engine: &Engine, tolerance: Option<f64>, bound: f64) -> Self {
-        let reach = if engine.steps_at_once(1) > 0 { engine.reach_of_a_step() } else { None };
-        let start = Vectors::default();
-        Self {
-            tolerance,
-            displacement: engine.movement().largest_displacement,
-            bound,
-            reach,
-            start,
-            single_steps: 0,
-        }
-    }
-
-    /// Takes at most `most` steps, and at least one.
-    fn advance(&mut self, engine: &mut Engine, most: usize) {
-        let count =
-            if self.single_steps == 0 { self.reach.map_or(0, |_| engine.steps_at_once(most)) } else { 0 };
-        let spacing = engine.body().lattice.spacing();
-        let from = self.displacement * spacing;
-        let reach = self.reach.map_or(f64::INFINITY, |reach| {
-            reach.after(count, from.max(engine.leaders_reach(count))) / spacing
-        });
-        // That is along each axis; along both at once, within the diagonal.
-        if count < 2 || reach * std::f64::consts::SQRT_2 * (1.0 + 1e-9) > self.bound {
-            self.single_steps = self.single_steps.saturating_sub(1);
-            let acts = engine.acts_next();
-            engine.advance();
-            // Another rule takes particles another distance.
-            if acts && self.reach.is_some() {
-                self.reach = engine.reach_of_a_step();
-            }
-            return;
-        }
-        let Some(tolerance) = self.tolerance else {
-            engine.advance_by(count, None);
-            return;
-        };
-        let (step, activity) = (engine.step(), engine.activity().clone());
-        self.start.clone_from(engine.present());
-        let moved = engine.advance_by(count, Some(tolerance * spacing * (1.0 + 1e-9)));
-        // The caller looks at the last one.
-        if moved[..count - 1].contains(&false) {
-            engine.return_to(step, &self.start, activity);
-            self.single_steps = count - 1;
-            engine.advance();
-        }
-    }
 }
 
 /// The divergence of a body that was put where its energies overflow; `None` for any other.

@@ -53,7 +53,7 @@ impl Engine {
     }
 
     /// Whether an action is planned for the next step.
-    pub fn acts_next(&self) -> bool {
+    pub(super) fn acts_next(&self) -> bool {
         self.next_action() == Some(self.step + 1)
     }
 

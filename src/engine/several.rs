@@ -2,11 +2,79 @@
 
 use super::Engine;
 use super::leaders::Led as Leader;
+use super::movement::Movement;
 use crate::engine::setup::RoleChange;
 use crate::flock::law::Flock;
 use crate::flock::vectors::{Vectors, distance};
 use crate::geometry::Point;
 use crate::sweep::{Activity, Led};
+
+/// Takes as many steps at once as can be known to hold neither the last one nor a divergence.
+pub struct StepBatch {
+    tolerance: Option<f64>,
+    /// Largest distance from the reference place over the spacing \[1\]: that of any particle now, and the bound on it.
+    displacement: f64,
+    bound: f64,
+    /// How far a step takes particles from the reference, if that is known.
+    reach: Option<Reach>,
+    /// Where a batch began, if it may have gone too far.
+    start: Vectors,
+    /// Steps to be taken one at a time.
+    single_steps: usize,
+}
+
+impl StepBatch {
+    /// For a body that comes to rest once nothing moves farther than `tolerance`, and diverges once something is farther
+    /// from its reference place than `bound`, both over the spacing \[1\].
+    pub fn new(engine: &Engine, tolerance: Option<f64>, bound: f64) -> Self {
+        let reach = if engine.steps_at_once(1) > 0 { engine.reach_of_a_step() } else { None };
+        let displacement = engine.movement().largest_displacement;
+        Self { tolerance, displacement, bound, reach, start: Vectors::default(), single_steps: 0 }
+    }
+
+    /// The step until which nothing looks at the body: the least over `look`, the next one that an observer looks at,
+    /// what the [engine](Engine::steps_at_once) has to come, and the bound on movement.
+    fn quiet_until(&self, engine: &Engine, look: usize) -> usize {
+        let (Some(reach), 0) = (self.reach, self.single_steps) else { return engine.step() };
+        let count = engine.steps_at_once(look - engine.step());
+        let spacing = engine.body().lattice.spacing();
+        let from = f64::max(self.displacement * spacing, engine.leaders_reach(count));
+        let farthest = reach.after(count, from) / spacing;
+        // That is along each axis; along both at once, within the diagonal.
+        let may_diverge = farthest * std::f64::consts::SQRT_2 * (1.0 + 1e-9) > self.bound;
+        engine.step() + if may_diverge { 0 } else { count }
+    }
+
+    /// Takes at least one step, and none beyond `look`; returns how the last one moved the body.
+    pub fn advance(&mut self, engine: &mut Engine, look: usize) -> Movement {
+        let (step, until) = (engine.step(), self.quiet_until(engine, look));
+        if until < step + 2 {
+            self.single_steps = self.single_steps.saturating_sub(1);
+            let acts = engine.acts_next();
+            engine.advance();
+            // Another rule takes particles another distance.
+            if acts && self.reach.is_some() {
+                self.reach = engine.reach_of_a_step();
+            }
+        } else if let Some(tolerance) = self.tolerance {
+            let activity = engine.activity.clone();
+            self.start.clone_from(&engine.present);
+            let farther = tolerance * engine.body.lattice.spacing() * (1.0 + 1e-9);
+            let moved = engine.advance_by(until - step, Some(farther));
+            // The last one is looked at.
+            if moved[..moved.len() - 1].contains(&false) {
+                engine.return_to(step, &self.start, activity);
+                self.single_steps = moved.len() - 1;
+                engine.advance();
+            }
+        } else {
+            engine.advance_by(until - step, None);
+        }
+        let movement = engine.movement();
+        self.displacement = movement.largest_displacement;
+        movement
+    }
+}
 
 impl Engine {
     /// How many steps, at most `most`, can be taken by [`Engine::advance_by`] from here; 0 where the next one
@@ -39,7 +107,7 @@ impl Engine {
     }
 
     /// Puts the body back to where it stood at an earlier step, with the same roles, as if it had not gone on.
-    pub fn return_to(&mut self, step: usize, places: &Vectors, activity: Activity) {
+    pub(super) fn return_to(&mut self, step: usize, places: &Vectors, activity: Activity) {
         self.step = step;
         self.settled = None;
         self.follow_ramp();
@@ -55,7 +123,7 @@ impl Engine {
     }
 
     /// How far from its reference place a leader gets in the next steps at most \[length\].
-    pub fn leaders_reach(&self, steps: usize) -> f64 {
+    fn leaders_reach(&self, steps: usize) -> f64 {
         let places = self.leaders_ahead(steps);
         let far = |(place, &particle): (&Point, &usize)| distance(*place, self.body.reference.get(particle));
         let farthest = places.iter().zip(self.led.iter().cycle()).map(far).fold(0.0, f64::max);
@@ -72,7 +140,7 @@ impl Engine {
 
     /// How far from the reference a step can take a particle if before it none is farther than 1, and how far if none has
     /// moved \[length\]; `None` where nothing is known.
-    pub fn reach_of_a_step(&self) -> Option<Reach> {
+    fn reach_of_a_step(&self) -> Option<Reach> {
         let reference = &self.body.reference;
         let moved = |j: usize| distance(self.flock.target(j, reference), reference.get(j));
         let gain = self.sweep.gain()?.max(1.0);
@@ -83,17 +151,17 @@ impl Engine {
 }
 
 /// A bound on what a step does.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reach {
+#[derive(Clone, Copy)]
+struct Reach {
     /// How many times as far from the reference a particle gets as any was \[1\].
-    pub gain: f64,
+    gain: f64,
     /// Distance added by loads, and by rest offsets that are missing \[length\].
-    pub offset: f64,
+    offset: f64,
 }
 
 impl Reach {
     /// How far particles get in so many steps that begin no farther than `from` \[length\], while leaders keep within that.
-    pub fn after(&self, steps: usize, from: f64) -> f64 {
+    fn after(&self, steps: usize, from: f64) -> f64 {
         (0..steps).fold(from, |reach, _| self.gain * reach + self.offset)
     }
 }
