@@ -2,6 +2,7 @@
 
 use super::axes::Axes;
 use super::colour::viridis;
+use super::raster::Raster;
 use super::svg::{Anchor, INK, Svg, text_width};
 use super::ticks::Ticks;
 
@@ -55,6 +56,19 @@ impl Bands {
             1 => viridis(0.0),
             count => viridis(band as f64 / (count - 1) as f64),
         }
+    }
+
+    /// Draws values at their places \[px\] as squares of the largest ones, of particles so far apart \[length\].
+    pub fn draw_raster(
+        &self,
+        svg: &mut Svg,
+        axes: &Axes,
+        spacing: f64,
+        values: impl Iterator<Item = Sample>,
+    ) {
+        let mut raster = Raster::over(axes, spacing);
+        values.for_each(|(place, value)| raster.drop(place, value));
+        raster.draw(svg, self.count(), |value| self.of(value), |band| self.colour(band));
     }
 
     /// Room that the bar takes beside a plot \[px\].

@@ -271,11 +271,9 @@ fn draw_dots(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, spacing: f64, fiel
 }
 
 fn draw_field_raster(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, field: &Field<'_>, spacing: f64) {
-    let mut raster = Raster::over(axes, spacing);
-    for (i, place) in snapshot.positions.iter().enumerate().filter(|(i, _)| snapshot.roles[*i].is_body()) {
-        raster.drop(axes.place(place), field.values[i]);
-    }
-    raster.draw_bands(svg, field.bands);
+    let drawn = snapshot.positions.iter().enumerate().filter(|(i, _)| snapshot.roles[*i].is_body());
+    let values = drawn.map(|(i, place)| (axes.place(place), field.values[i]));
+    field.bands.draw_raster(svg, axes, spacing, values);
 }
 
 /// Dots leave gaps through which bonds are seen \[px\].

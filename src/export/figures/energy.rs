@@ -6,7 +6,6 @@ use super::configuration::dot_radius;
 use super::faces::faces;
 use super::heading::Heading;
 use super::page;
-use super::raster::Raster;
 use super::svg::{Path, Svg};
 use super::{MOST_DOTS, Subject};
 use crate::continuum::record::Snapshot;
@@ -38,7 +37,8 @@ pub fn pe1(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
     }
     page::with_body(&heading, axes, subject.unit, bands.bar_room(), |svg, axes| {
         if is_raster {
-            draw_raster(svg, axes, snapshot, &drawn, &bands, spacing);
+            let value = |&i: &usize| (axes.place(snapshot.positions.get(i)), snapshot.pe1[i]);
+            bands.draw_raster(svg, axes, spacing, drawn.iter().map(value));
         } else {
             draw_contours(svg, axes, subject, (snapshot, &snapshot.pe1), &is_drawn, &bands);
         }
@@ -105,19 +105,4 @@ fn superlevel(patches: &[Vec<Sample>], level: Option<f64>) -> Path {
         }
     }
     path
-}
-
-fn draw_raster(
-    svg: &mut Svg,
-    axes: &Axes,
-    snapshot: &Snapshot,
-    drawn: &[usize],
-    bands: &Bands,
-    spacing: f64,
-) {
-    let mut raster = Raster::over(axes, spacing);
-    for &i in drawn {
-        raster.drop(axes.place(snapshot.positions.get(i)), snapshot.pe1[i]);
-    }
-    raster.draw_bands(svg, bands);
 }

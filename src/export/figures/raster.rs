@@ -2,7 +2,6 @@
 
 use super::PNG_ZOOM;
 use super::axes::Axes;
-use super::bands::Bands;
 use super::svg::{Path, Svg};
 
 /// Squares over a plot; those that nothing fell into stay empty.
@@ -75,11 +74,6 @@ impl Raster {
         for (n, path) in self.paths(classes, class).iter().enumerate() {
             svg.path(path, format_args!("fill=\"{}\" shape-rendering=\"crispEdges\"", colour(n)));
         }
-    }
-
-    /// Draws the squares in the colours of bands.
-    pub fn draw_bands(&self, svg: &mut Svg, bands: &Bands) {
-        self.draw(svg, bands.count(), |value| bands.of(value), |band| bands.colour(band));
     }
 }
 

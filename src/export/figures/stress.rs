@@ -7,7 +7,6 @@ use super::comparison::{enlargement, scale_note};
 use super::energy::draw_bands;
 use super::heading::Heading;
 use super::page;
-use super::raster::Raster;
 use super::svg::{Path, Svg};
 use crate::continuum::mechanics::Stresses;
 use crate::continuum::record::Snapshot;
@@ -53,7 +52,10 @@ pub fn stress(
     let heading = Heading { title: subject.title.into(), note, ..Heading::default() };
     page::with_body(&heading, axes, subject.unit, bands.bar_room(), |svg, axes| {
         if is_raster {
-            draw_raster(svg, axes, &places, &shown, &bands, subject.body.lattice.spacing());
+            let middle =
+                |cell: &[u32]| cell.iter().map(|&i| places.get(i as usize)).collect::<Vectors>().middle();
+            let value = |(cell, value): &(&[u32], f64)| (axes.place(middle(cell)), *value);
+            bands.draw_raster(svg, axes, subject.body.lattice.spacing(), shown.iter().map(value));
         } else if let Some(values) = &corners {
             draw_bands(svg, &patches(axes, &places, &shown, values), &bands);
         } else {
@@ -115,20 +117,4 @@ fn draw_cells(svg: &mut Svg, axes: &Axes, places: &Vectors, shown: &[(&[u32], f6
         let line = "stroke-width=\"0.4\" stroke-linejoin=\"round\"";
         svg.path(path, format_args!("class=\"cells\" fill=\"{colour}\" stroke=\"{colour}\" {line}"));
     }
-}
-
-fn draw_raster(
-    svg: &mut Svg,
-    axes: &Axes,
-    places: &Vectors,
-    shown: &[(&[u32], f64)],
-    bands: &Bands,
-    spacing: f64,
-) {
-    let mut raster = Raster::over(axes, spacing);
-    for (cell, value) in shown {
-        let corners: Vectors = cell.iter().map(|&i| places.get(i as usize)).collect();
-        raster.drop(axes.place(corners.middle()), *value);
-    }
-    raster.draw_bands(svg, bands);
 }
