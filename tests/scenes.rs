@@ -398,9 +398,10 @@ fn a_cut_body_at_rest_stays_where_it_is_without_ghosts() {
 
 #[test]
 fn a_strip_torn_in_two_without_ghosts_comes_to_rest_in_two_unstrained_pieces_whenever_it_is_resumed() {
-    use flockform::continuum::run::resume;
+    use flockform::continuum::run::run_shared;
     use flockform::engine::observer::EachStep;
     use flockform::engine::state::EngineState;
+    use flockform::ranks::Team;
     let led = "[[roles]]\nregion = { kind = \"edge\", side = \"right\", depth = 1.2 }\nrole = \"leader\"\n\
                motion = { kind = \"keyframes\", frames = [{ step = 200, displacement = [4.0, 1.0] }] }\n";
     let scene = without_ghosts("torn", &format!("stop = {{ steps = 4000 }}\n{CLAMPED}{led}"));
@@ -422,7 +423,9 @@ fn a_strip_torn_in_two_without_ghosts_comes_to_rest_in_two_unstrained_pieces_whe
     assert!(count + 4 > engine.body().count(), "{count} of {}", engine.body().count());
     let (state, residual) = kept.expect("came that far");
     let mut see = |_: &Engine, _: f64| ControlFlow::Continue(());
-    let resumed = resume(planned(&scene), state, residual, &mut EachStep(&mut see)).expect("the same body");
+    let from = Some((state, residual));
+    let resumed =
+        run_shared(planned(&scene), from, None::<&Team>, &mut EachStep(&mut see)).expect("the same body");
     let bits =
         |engine: &Engine| -> Vec<[u64; 2]> { engine.present().iter().map(|p| p.map(f64::to_bits)).collect() };
     assert!(bits(&resumed.engine) == bits(engine));

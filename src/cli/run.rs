@@ -12,10 +12,10 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use flockform::continuum::digest::{digest, digest_of_parts, fnv1a};
-use flockform::continuum::equilibrium::{run_to_equilibrium_shared, run_to_equilibrium_watched};
+use flockform::continuum::equilibrium::run_to_equilibrium_shared;
 use flockform::continuum::looks::Looks;
 use flockform::continuum::plan::Plan;
-use flockform::continuum::run::{Outcome, SharedError, StopReason, require_shareable, resume};
+use flockform::continuum::run::{Outcome, SharedError, StopReason, require_shareable};
 use flockform::continuum::shares::bytes_each;
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
 use flockform::export::film;
@@ -219,17 +219,11 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     };
     begin.begin(common)?;
     let from = left.map(|left| left.checkpoint).map(|Checkpoint { engine, residual, .. }| (engine, residual));
-    let outcome = match (team, from) {
-        (Some(team), from) => run_to_equilibrium_shared(&scene, plan, from, team, &mut observer).map_err(
-            |error| match error {
-                SharedError::Scene(error) => Refusal::from(error),
-                error => ResumedRun::foreign(observer.folder, &error).into(),
-            },
-        )?,
-        (None, None) => run_to_equilibrium_watched(&scene, plan, &mut observer)?,
-        (None, Some((engine, residual))) => resume(plan, engine, residual, &mut observer)
-            .map_err(|error| ResumedRun::foreign(observer.folder, &error))?,
-    };
+    let outcome = run_to_equilibrium_shared(&scene, plan, from, team, &mut observer);
+    let outcome = outcome.map_err(|error| match error {
+        SharedError::Scene(error) => Refusal::from(error),
+        error => ResumedRun::foreign(observer.folder, &error).into(),
+    })?;
     let RunObserver { mut recorder, messages, progress, checkpointer, .. } = observer;
     progress.finish();
     if let Some(messages) = messages {

@@ -46,23 +46,27 @@ pub fn run_to_equilibrium_watched(
     come_to_rest(scene, plan, None, observer)
 }
 
-/// Runs a plan to its end as its scene asks, shared with the other ranks, which all must have the same scene and plan; goes on
-/// from a state of a stepped run and the residual that was seen with it. The results are those of a run alone, to the bit, on
-/// every rank, and the observers are as [`run_shared`] has them.
+/// Runs a plan to its end as its scene asks, or goes on from a state of a stepped run and the residual that was seen with
+/// it; where there is a `team`, shared with the other ranks, which all must have the same scene and plan. The results are
+/// those of a run alone, to the bit, on every rank, and the observers are as [`run_shared`] has them.
 ///
 /// # Errors
 /// As [`run_to_equilibrium`] and [`run_shared`].
-pub fn run_to_equilibrium_shared(
+pub fn run_to_equilibrium_shared<'t>(
     scene: &Scene,
     plan: Plan,
     from: Option<(EngineState<'_>, f64)>,
-    team: &Team,
+    team: impl Into<Option<&'t Team>>,
     observer: &mut dyn Observer,
 ) -> Result<Outcome, SharedError> {
+    let team = team.into();
     if scene.equilibrium.is_none() || from.is_some() {
         return run_shared(plan, from, team, observer);
     }
-    Ok(come_to_rest(scene, plan, Some(team), &mut Agreed { team, own: observer })?)
+    Ok(match team {
+        None => come_to_rest(scene, plan, None, observer)?,
+        Some(team) => come_to_rest(scene, plan, Some(team), &mut Agreed { team, own: observer })?,
+    })
 }
 
 fn come_to_rest(

@@ -119,52 +119,41 @@ pub fn run(plan: Plan, see: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>) -> 
 
 /// Runs a plan to its end, seen at those steps alone that the observer names. The results are the same to the bit.
 pub fn run_watched(plan: Plan, observer: &mut dyn Observer) -> Outcome {
-    let bounds = Bounds::of(&plan);
-    let engine = Engine::new(plan.setup);
-    let residual = f64::INFINITY;
-    let interrupted = observer.see(&engine, residual).is_break();
-    run_loop(engine, (residual, interrupted), &bounds, observer)
+    run_shared(plan, None, None::<&Team>, observer).expect("neither shared nor resumed")
 }
 
-/// Runs a plan on from where an earlier run of it was, to the same end bit by bit. `residual` is the one that
-/// was seen with the state; `observer` sees the engine after new steps.
-///
-/// # Errors
-/// A state of another body.
-pub fn resume(
-    plan: Plan,
-    state: EngineState<'_>,
-    residual: f64,
-    observer: &mut dyn Observer,
-) -> Result<Outcome, WrongState> {
-    let bounds = Bounds::of(&plan);
-    Ok(run_loop(state.engine(plan.setup)?, (residual, false), &bounds, observer))
-}
-
-/// Runs a plan, or goes on with it from a state and the residual that was seen with it, shared with the other ranks, which
-/// all must have the same plan. The results are those of a run alone, to the bit, on every rank. The first rank's `observer`
-/// names the steps that are looked at; at these every rank's sees the whole body, and any of them can break the run off.
+/// Runs a plan, or goes on with it from a state and the residual that was seen with it, to the same end bit by bit; where
+/// there is a `team`, shared with the other ranks, which all must have the same plan. The results are those of a run
+/// alone, to the bit, on every rank. The first rank's `observer` names the steps that are looked at; at these every rank's
+/// sees the whole body, and any of them can break the run off. The state that is gone on from is not seen again.
 ///
 /// # Errors
 /// A sweep that cannot be shared, or a state of another body.
-pub fn run_shared(
+pub fn run_shared<'t>(
     plan: Plan,
     from: Option<(EngineState<'_>, f64)>,
-    team: &Team,
+    team: impl Into<Option<&'t Team>>,
     observer: &mut dyn Observer,
 ) -> Result<Outcome, SharedError> {
-    let mut observer = Agreed { team, own: observer };
     let bounds = Bounds::of(&plan);
     let (mut engine, residual) = match from {
         Some((state, residual)) => (state.engine(plan.setup)?, Some(residual)),
         None => (Engine::new(plan.setup), None),
     };
-    engine.join(team.clone())?;
+    let mut agreed;
+    let observer: &mut dyn Observer = match team.into() {
+        None => observer,
+        Some(team) => {
+            engine.join(team.clone())?;
+            agreed = Agreed { team, own: observer };
+            &mut agreed
+        }
+    };
     let begin = match residual {
         Some(residual) => (residual, false),
         None => (f64::INFINITY, observer.see(&engine, f64::INFINITY).is_break()),
     };
-    Ok(run_loop(engine, begin, &bounds, &mut observer))
+    Ok(run_loop(engine, begin, &bounds, observer))
 }
 
 /// Whether ranks can share the run of a scene.

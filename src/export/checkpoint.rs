@@ -1,4 +1,4 @@
-//! `checkpoint`: a stepped run on its way, so that a killed one can go on ([`crate::continuum::run::resume`]).
+//! `checkpoint`: a stepped run on its way, so that a killed one can go on ([`crate::continuum::run::run_shared`]).
 //!
 //! | bytes | what |
 //! |---|---|

@@ -6,11 +6,12 @@ use std::time::Duration;
 
 use flockform::continuum::digest::digest;
 use flockform::continuum::record::{ProbeSeries, Snapshot};
-use flockform::continuum::run::resume;
+use flockform::continuum::run::run_shared;
 use flockform::engine::Engine;
 use flockform::engine::observer::EachStep;
 use flockform::engine::state::EngineState;
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
+use flockform::ranks::Team;
 use flockform::scene::Scene;
 
 use super::*;
@@ -58,8 +59,8 @@ fn a_damaged_checkpoint_is_gone_on_from_or_refused() {
         if read.require_of(folder.path(), &scene, digest(&plan)).is_err() {
             return;
         }
-        let _ =
-            resume(plan, read.engine, read.residual, &mut EachStep(&mut |_, _| ControlFlow::Continue(())));
+        let from = Some((read.engine, read.residual));
+        let _ = run_shared(plan, from, None::<&Team>, &mut EachStep(&mut |_, _| ControlFlow::Continue(())));
     });
     if let (Some(before), Some(after)) = (before, peak()) {
         assert!(after < before + 600_000, "{before} kB, and {after} kB afterwards");

@@ -15,6 +15,14 @@ fn plan(scene: &Scene) -> Plan {
     Plan::new(scene).expect("can be laid out")
 }
 
+fn resumed(
+    plan: Plan,
+    from: (EngineState<'_>, f64),
+    see: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>,
+) -> Outcome {
+    run_shared(plan, Some(from), None::<&Team>, &mut EachStep(see)).expect("the same body")
+}
+
 /// The state, and what depends on the neighbours: PE1 and the residual, then how the run ended.
 fn bits(outcome: &Outcome) -> (EngineState<'static>, Vec<u64>, String) {
     let engine = &outcome.engine;
@@ -42,8 +50,7 @@ fn continues_to_the_same_end(name: &str, sets: &[&str], at: &[usize]) {
             seen += 1;
             ControlFlow::Continue(())
         };
-        let resumed = resume(plan(&scene), state, residual, &mut EachStep(&mut see));
-        let resumed = resumed.expect("the same body");
+        let resumed = resumed(plan(&scene), (state, residual), &mut see);
         assert!(bits(&resumed) == bits(&whole), "{name} from step {step}");
         assert_eq!(seen, whole.engine.step() - step, "{name} from step {step}: every new step is shown once");
     }
@@ -123,9 +130,8 @@ fn a_run_that_had_come_to_rest_takes_no_further_step() {
     let whole = run(plan(&scene), &mut |_, _| ControlFlow::Continue(()));
     assert_eq!(whole.reason, StopReason::Equilibrium);
     let state = EngineState::of(&whole.engine);
-    let resumed =
-        resume(plan(&scene), state, whole.residual, &mut EachStep(&mut |_, _| ControlFlow::Continue(())));
-    assert!(bits(&resumed.expect("the same body")) == bits(&whole));
+    let resumed = resumed(plan(&scene), (state, whole.residual), &mut |_, _| ControlFlow::Continue(()));
+    assert!(bits(&resumed) == bits(&whole));
 }
 
 #[test]
