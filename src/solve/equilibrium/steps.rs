@@ -18,6 +18,17 @@ pub fn for_groups<P: Send, R: Send>(groups: Vec<P>, work: impl Fn(usize, P) -> R
     }
 }
 
+/// Does two pieces of work that need nothing of each other, at the same time where there are threads for both.
+pub fn side_by_side<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
+    if rayon::current_num_threads() > 1 { rayon::join(a, b) } else { (a(), b()) }
+}
+
+/// Does some work on a list, cut into as many pieces as there are threads, each of `least` or more; answers in order.
+pub fn in_pieces<P: Sync, R: Send>(list: &[P], least: usize, work: impl Fn(&[P]) -> Vec<R> + Sync) -> Vec<R> {
+    let size = list.len().div_ceil(rayon::current_num_threads()).max(least);
+    for_groups(list.chunks(size).collect(), |_, piece| work(piece)).into_iter().flatten().collect()
+}
+
 /// The same on every group of a matrix that this rank owns; `parts` are theirs.
 pub fn for_own_groups<P: Send, R: Send>(
     matrix: &Matrix,

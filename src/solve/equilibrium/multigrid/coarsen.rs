@@ -11,6 +11,7 @@ use super::transfer::{OutlierShares, Transfer, parents_of_place};
 use crate::flock::block::Block;
 use crate::flock::body::Body;
 use crate::flock::lattice::Site;
+use crate::solve::equilibrium::steps::in_pieces;
 use crate::solve::operator::{Columns, HELD, Matrix, Outliers, Row, leads_to_outlier};
 
 /// How much coarser the first grid is than the lattice, in particles per node.
@@ -48,6 +49,9 @@ pub fn next_steps(spacing: [f64; 2]) -> [i32; 2] {
     }
 }
 
+/// Fewest rows of a coarse grid that a thread sums: what two threads share of their surroundings each computes for itself.
+const PIECE: usize = 64;
+
 /// The matrix of the coarse grid, and the shares of particles at no site in its nodes.
 pub fn coarsen(fine: &Matrix, transfer: Transfer) -> (Matrix, OutlierShares) {
     let parents = Parents::new(transfer.steps);
@@ -76,14 +80,18 @@ pub fn coarsen(fine: &Matrix, transfer: Transfer) -> (Matrix, OutlierShares) {
         });
     }
     singles.extend(beside);
-    let mut sums = Sums::default();
-    let mut rows: Vec<Row> =
-        patterns.iter().map(|pattern| galerkin(fine, &parents, pattern, &mut sums)).collect();
-    let mut halves = Halves::new(fine, &parents, &of_outliers);
-    for (node, of_node) in singles {
-        nodes.push((node, rows.len() as u32));
-        rows.push(halves.row(node, of_node, &mut sums));
-    }
+    // Neighbours share halves: those that are summed one after the other are to lie side by side.
+    singles.sort_by_key(|(node, _)| *node);
+    let patterns: Vec<&[u32]> = patterns.iter().collect();
+    let mut rows = in_pieces(&patterns, PIECE, |patterns| {
+        let mut sums = Sums::default();
+        patterns.iter().map(|pattern| galerkin(fine, &parents, pattern, &mut sums)).collect()
+    });
+    nodes.extend((rows.len() as u32..).zip(&singles).map(|(class, (node, _))| (*node, class)));
+    rows.extend(in_pieces(&singles, PIECE, |singles| {
+        let (mut halves, mut sums) = (Halves::new(fine, &parents, &of_outliers), Sums::default());
+        singles.iter().map(|(node, of_node)| halves.row(*node, of_node, &mut sums)).collect()
+    }));
     // Ascending lists one after the other, which a stable sort joins.
     nodes.sort();
     let columns = Columns::new(nodes.iter().map(|&(site, _)| site), |_| true);

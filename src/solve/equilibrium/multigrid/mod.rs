@@ -28,7 +28,7 @@ use std::sync::Arc;
 use self::envelope::Envelope;
 use self::transfer::{OutlierShares, Transfer};
 use super::conjugate_gradients::{Preconditioner, iterate, iterate_single, single_scale};
-use super::steps::{for_groups, for_own_groups};
+use super::steps::{for_groups, for_own_groups, side_by_side};
 use super::system::Prepared;
 use super::{Found, Precision, Request, SolveError, Solver, lanczos, steps};
 use crate::flock::vectors::Vectors;
@@ -155,12 +155,13 @@ impl<'a> Cycle<'a> {
                 0 => coarsen::first_steps(grid, particles_per_site(fine)),
                 _ => coarsen::next_steps(spacing),
             };
-            let level = Level::new(fine, Transfer { steps }, scale);
+            let stencils = cycle.levels.last().map_or(&cycle.finest, |level| &level.stencils);
+            let (level, found) =
+                side_by_side(|| Level::new(fine, Transfer { steps }, scale), || weights(fine, stencils));
             if level.matrix.count() >= fine.count() {
                 break;
             }
-            let stencils = cycle.levels.last().map_or(&cycle.finest, |level| &level.stencils);
-            let found = weights(fine, stencils).ok_or(not_positive.clone())?;
+            let found = found.ok_or(not_positive.clone())?;
             *cycle.levels.last_mut().map_or(&mut cycle.weights, |level| &mut level.weights) = found;
             spacing = [0, 1].map(|k| spacing[k] * f64::from(steps[k]));
             cycle.levels.push(level);
