@@ -55,7 +55,7 @@ fn least(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 #[test]
-#[ignore = "times, for an optimised build and a quiet machine; not reached yet: 1.6 to 1.85 on one thread"]
+#[ignore = "times, for an optimised build and a quiet machine; not reached yet: 1.4 to 2.0 on two threads"]
 fn fitted_bodies_are_solved_in_at_most_half_as_much_time_more_than_whole_cells() {
     let plate = |sides: [f64; 2]| format!("shape = {{ kind = \"rectangle\", max = {sides:?} }}");
     let sieve = |n: usize, radius: f64| format!("{}\nholes = [{}]", plate([40.0; 2]), holes(n, radius));
