@@ -550,8 +550,13 @@ impl Exchange for Noisy {
         self.0.count()
     }
 
-    fn swap(&mut self, messages: &[(usize, Vec<u64>)], from: &[(usize, usize)]) -> Vec<Vec<u64>> {
-        let mut received = self.0.swap(messages, from);
+    fn swap(
+        &mut self,
+        messages: &[(usize, Vec<u64>)],
+        from: &[(usize, usize)],
+        meanwhile: &mut dyn FnMut(),
+    ) -> Vec<Vec<u64>> {
+        let mut received = self.0.swap_while(messages, from, meanwhile);
         received.iter_mut().filter_map(|words| words.last_mut()).for_each(|word| *word ^= 1 << 20);
         received
     }

@@ -3,6 +3,7 @@
 use super::Engine;
 use super::leaders::Led as Leader;
 use super::movement::Movement;
+use super::shared::take_steps;
 use crate::engine::setup::RoleChange;
 use crate::flock::law::Flock;
 use crate::flock::vectors::{Vectors, distance};
@@ -96,11 +97,16 @@ impl Engine {
     /// Takes so many steps, as many as [`Engine::steps_at_once`] allows; the bits are those of single ones.
     /// Returns for each whether a particle is known to have moved farther in it than `farther` \[length\].
     pub fn advance_by(&mut self, count: usize, farther: Option<f64>) -> Vec<bool> {
-        self.receive_halo(count);
         let led = Led { particles: &self.led, places: &self.leaders_ahead(count) };
-        let places = (&mut self.present, &mut self.previous);
-        let frame = self.body.frame.as_ref();
-        let moved = self.sweep.steps(&self.flock, frame, places, (count, led, farther), &mut self.activity);
+        let steps = self.sweep.steps_to_take(&self.flock, self.body.frame.as_ref(), (count, led, farther));
+        let ranks = self.team.as_ref().zip(self.sweep.domain()).filter(|_| !self.is_whole);
+        let ranks = ranks.map(|((team, _), domain)| (team, domain));
+        let places = [&mut self.present, &mut self.previous];
+        let moved = take_steps(&steps, ranks, places, &mut self.activity);
+        if count % 2 == 1 {
+            std::mem::swap(&mut self.present, &mut self.previous);
+        }
+        self.is_whole = self.team.is_none();
         self.step += count;
         self.settled = None;
         if farther.is_some() { self.on_any_rank(moved) } else { moved }

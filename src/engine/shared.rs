@@ -19,9 +19,9 @@ use super::observer::Observer;
 use crate::flock::body::Part;
 use crate::flock::vectors::{Vectors, distance};
 use crate::ranks::Team;
-use crate::sweep::Order;
 use crate::sweep::caches::Caches;
-use crate::sweep::domain::{Domain, Held, Needs, Share};
+use crate::sweep::domain::{Domain, Halo, Held, Needs, Share};
+use crate::sweep::{Activity, Order, Stage, Steps};
 
 /// A sweep that ranks cannot share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -90,14 +90,6 @@ impl Engine {
         }
     }
 
-    /// Exchanges the particles that must be known for so many steps together.
-    pub(super) fn receive_halo(&mut self, steps: usize) {
-        let (Some((team, _)), Some(domain)) = (&self.team, self.sweep.domain()) else { return };
-        if !std::mem::replace(&mut self.is_whole, false) {
-            receive(team, domain, steps, [&mut self.present]);
-        }
-    }
-
     /// Learns what the other ranks move and need; to be called by all of them when the sweep is compiled.
     pub(super) fn agree_on_needs(&mut self) {
         let (Some((team, _)), Some(_)) = (&self.team, &self.body.part) else { return };
@@ -160,15 +152,54 @@ impl Engine {
     }
 }
 
+/// Takes several steps: of a body that is shared what needs nothing of the other ranks while the halo is on its way. The
+/// places are those of now and those before the last step.
+pub(super) fn take_steps(
+    steps: &Steps<'_, f64>,
+    ranks: Option<(&Team, &Domain)>,
+    [present, previous]: [&mut Vectors; 2],
+    activity: &mut Activity,
+) -> Vec<bool> {
+    let mut under_way = steps.begin(activity);
+    let mut stage = Stage::All;
+    if let Some((team, domain)) = ranks {
+        let halo = domain.halo(steps.count);
+        let (sent, sizes) = messages(&halo, &[&*present]);
+        let received = team.swap_while(&sent, &sizes, &mut || {
+            if steps.has_inside() {
+                steps.go_on(&mut under_way, Stage::Inside, both(present), both(previous));
+                stage = Stage::Rim;
+            }
+        });
+        put_all(&halo, &received, &mut [&mut *present]);
+    }
+    steps.go_on(&mut under_way, stage, both(present), both(previous));
+    steps.end(under_way, activity)
+}
+
+fn both(points: &mut Vectors) -> [&mut [f64]; 2] {
+    [&mut points.x, &mut points.y]
+}
+
 /// Receives what is needed of others before so many steps.
 fn receive<const N: usize>(team: &Team, domain: &Domain, steps: usize, mut points: [&mut Vectors; N]) {
     let halo = domain.halo(steps);
+    let (sent, sizes) = messages(&halo, &points.each_ref().map(|points| &**points));
+    put_all(&halo, &team.swap(&sent, &sizes), &mut points);
+}
+
+/// What is sent, and how many words are received: (rank, words).
+#[allow(clippy::type_complexity)]
+fn messages(halo: &Halo, points: &[&Vectors]) -> (Vec<(usize, Vec<u64>)>, Vec<(usize, usize)>) {
     let sent = |(rank, of): &(usize, Range<usize>)| {
         (*rank, points.iter().flat_map(|points| words(points, of)).collect())
     };
-    let sent: Vec<(usize, Vec<u64>)> = halo.sends.iter().map(sent).collect();
-    let sizes: Vec<_> = halo.receives.iter().map(|(rank, of)| (*rank, 2 * N * of.len())).collect();
-    for ((_, of), words) in halo.receives.iter().zip(team.swap(&sent, &sizes)) {
+    let size = |(rank, of): &(usize, Range<usize>)| (*rank, 2 * points.len() * of.len());
+    (halo.sends.iter().map(sent).collect(), halo.receives.iter().map(size).collect())
+}
+
+fn put_all(halo: &Halo, received: &[Vec<u64>], points: &mut [&mut Vectors]) {
+    for ((_, of), words) in halo.receives.iter().zip(received) {
         for (points, words) in points.iter_mut().zip(words.chunks_exact(2 * of.len())) {
             put(points, of, words);
         }

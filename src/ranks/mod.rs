@@ -30,8 +30,13 @@ pub trait Exchange: Send {
     fn count(&self) -> usize;
 
     /// Sends each message to its rank and receives as many words as are asked for from each of `from`, in their order:
-    /// (rank, words). A rank is named at most once in each, and never this one.
-    fn swap(&mut self, messages: &[(usize, Vec<u64>)], from: &[(usize, usize)]) -> Vec<Vec<u64>>;
+    /// (rank, words). A rank is named at most once in each, and never this one. Does `meanwhile`, once, while they travel.
+    fn swap(
+        &mut self,
+        messages: &[(usize, Vec<u64>)],
+        from: &[(usize, usize)],
+        meanwhile: &mut dyn FnMut(),
+    ) -> Vec<Vec<u64>>;
 
     /// The words of all ranks, one after the other; `counts` says how many each has, shape \[ranks\].
     fn gather(&mut self, own: &[u64], counts: &[usize]) -> Vec<u64>;
@@ -73,9 +78,19 @@ impl Team {
         self.rank == 0
     }
 
-    /// See [`Exchange::swap`].
+    /// See [`Exchange::swap`]; there is nothing else to do.
     pub fn swap(&self, messages: &[(usize, Vec<u64>)], from: &[(usize, usize)]) -> Vec<Vec<u64>> {
-        self.exchange().swap(messages, from)
+        self.swap_while(messages, from, &mut || ())
+    }
+
+    /// See [`Exchange::swap`].
+    pub fn swap_while(
+        &self,
+        messages: &[(usize, Vec<u64>)],
+        from: &[(usize, usize)],
+        meanwhile: &mut dyn FnMut(),
+    ) -> Vec<Vec<u64>> {
+        self.exchange().swap(messages, from, meanwhile)
     }
 
     /// See [`Exchange::gather`].

@@ -85,7 +85,12 @@ impl Exchange for Processes {
         usize::try_from(SimpleCommunicator::world().size()).unwrap_or(1)
     }
 
-    fn swap(&mut self, messages: &[(usize, Vec<u64>)], from: &[(usize, usize)]) -> Vec<Vec<u64>> {
+    fn swap(
+        &mut self,
+        messages: &[(usize, Vec<u64>)],
+        from: &[(usize, usize)],
+        meanwhile: &mut dyn FnMut(),
+    ) -> Vec<Vec<u64>> {
         let world = SimpleCommunicator::world();
         let mut received: Vec<Vec<u64>> = from.iter().map(|&(_, words)| vec![0; words]).collect();
         mpi::request::scope(|scope| {
@@ -98,6 +103,7 @@ impl Exchange for Processes {
             for (rank, words) in messages {
                 sending.push(world.process_at_rank(counted(*rank)).immediate_send(scope, &words[..]));
             }
+            meanwhile();
             receiving.into_iter().for_each(|one| {
                 one.wait();
             });

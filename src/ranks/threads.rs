@@ -54,8 +54,14 @@ impl Exchange for Threads {
         self.to.len()
     }
 
-    fn swap(&mut self, messages: &[(usize, Vec<u64>)], from: &[(usize, usize)]) -> Vec<Vec<u64>> {
+    fn swap(
+        &mut self,
+        messages: &[(usize, Vec<u64>)],
+        from: &[(usize, usize)],
+        meanwhile: &mut dyn FnMut(),
+    ) -> Vec<Vec<u64>> {
         messages.iter().for_each(|(rank, words)| self.send(*rank, words.clone()));
+        meanwhile();
         from.iter().map(|&(rank, count)| self.receive(rank, count)).collect()
     }
 

@@ -27,8 +27,9 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use schedule::LaggedFrame;
 pub use schedule::{Activity, Led, MOST_STEPS};
-use schedule::{LaggedFrame, Steps};
+pub(crate) use schedule::{Stage, Steps};
 
 use crate::flock::frame::Frame;
 use crate::flock::lanes::vectors;
@@ -260,21 +261,26 @@ impl Sweep {
         (count, led, farther): (usize, Led<'_>, Option<f64>),
         activity: &mut Activity,
     ) -> Vec<bool> {
-        let rows = self.rows.as_ref().expect("a sweep that takes several steps has rows");
-        let (rest, force) = (flock.rest.as_ref(), flock.forces.as_ref());
-        let [rest, force] = [rest, force].map(|points| points.map(|points| [&points.x[..], &points.y[..]]));
-        let threads = rayon::current_num_threads();
-        let reference = [&flock.reference.x[..], &flock.reference.y[..]];
-        let frame = frame.map(|frame| LaggedFrame { frame, reference });
-        let terms = self.terms.of(flock);
-        let owned = self.bands(rows);
-        let steps = Steps { rows, owned, terms, rest, force, frame, led, count, farther, threads };
-        let even = [&mut present.x[..], &mut present.y[..]];
-        let farther = steps.take(activity, even, [&mut next.x[..], &mut next.y[..]]);
+        let steps = self.steps_to_take(flock, frame, (count, led, farther));
+        let farther = steps.take(activity, [&mut present.x, &mut present.y], [&mut next.x, &mut next.y]);
         if count % 2 == 1 {
             std::mem::swap(present, next);
         }
         farther
+    }
+
+    /// The steps of [`Sweep::steps`], before they are taken.
+    pub(crate) fn steps_to_take<'a>(
+        &'a self,
+        flock: &'a Flock,
+        frame: Option<&'a Frame>,
+        (count, led, farther): (usize, Led<'a>, Option<f64>),
+    ) -> Steps<'a, f64> {
+        let rows = self.rows.as_ref().expect("a sweep that takes several steps has rows");
+        let [rest, force] = [&flock.rest, &flock.forces].map(|points| points.as_ref().map(both));
+        let frame = frame.map(|frame| LaggedFrame { frame, reference: both(&flock.reference) });
+        let (terms, owned, threads) = (self.terms.of(flock), self.bands(rows), rayon::current_num_threads());
+        Steps { rows, owned, terms, rest, force, frame, led, count, farther, threads }
     }
 
     /// How many particles follow; of a part of a body, of its own.
@@ -348,6 +354,10 @@ impl Sweep {
         let here = seen.get(j);
         [0, 1].map(|k| here[k] + damping * (target[k] - here[k]))
     }
+}
+
+fn both(points: &Vectors) -> [&[f64]; 2] {
+    [&points.x, &points.y]
 }
 
 fn coordinates(points: &Vectors, axis: usize) -> &[f64] {

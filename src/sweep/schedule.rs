@@ -9,7 +9,8 @@
 //!
 //! Threads share the coordinates first, which know nothing of each other, and then the bands: each thread
 //! takes a segment, of which every step leaves off one more band at the cuts between segments; then the
-//! wedges left at the cuts are filled in.
+//! wedges left at the cuts are filled in. A body that ranks share is cut in the same way where they meet: what lies between is
+//! swept while the bands of the others are on their way ([`Stage`]).
 //!
 //! A band that did not change in a step, beside others that did not either, will not change in the next:
 //! it is left out. So a body costs what of it moves.
@@ -122,29 +123,99 @@ pub struct Steps<'a, T> {
     pub threads: usize,
 }
 
+/// Which of the work is done: all of it at once, or in turn what needs nothing of the bands around those owned, and the rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    All,
+    Inside,
+    Rim,
+}
+
+/// Steps that have begun.
+pub struct UnderWay {
+    /// Whether bands changed, for each band and level, of x and of y, or of both where they are swept together.
+    flags: [Vec<bool>; 2],
+    seen: Seen,
+}
+
 impl<T: Real> Steps<'_, T> {
     /// Takes the steps. After an odd number of them the result stands in `odd`, after an even number in
     /// `even`, which holds the present positions; the other holds those one step before. Returns for each step whether
     /// any particle moved farther in it than `farther` along an axis.
     pub fn take(&self, activity: &mut Activity, even: [&mut [T]; 2], odd: [&mut [T]; 2]) -> Vec<bool> {
+        let mut under_way = self.begin(activity);
+        self.go_on(&mut under_way, Stage::All, even, odd);
+        self.end(under_way, activity)
+    }
+
+    /// Whether coordinates are swept together: a list that has been read serves both.
+    fn sweeps_both(&self) -> bool {
+        self.rows.share_in_runs() < 0.5 || self.rows.couples(&self.terms)
+    }
+
+    /// Whether the inside can be swept before the rim: each is to be wide enough for a front.
+    pub fn has_inside(&self) -> bool {
+        self.rows.is_local() && self.owned.len() >= 3 * (self.count + 1)
+    }
+
+    /// Begins the steps.
+    pub fn begin(&self, activity: &mut Activity) -> UnderWay {
         if activity.band_size != self.rows.band_size() {
             activity.forget();
             activity.band_size = self.rows.band_size();
         }
-        let ([changed_x, changed_y], [even_x, even_y], [odd_x, odd_y]) = (&mut activity.changed, even, odd);
+        let (bands, levels) = (self.rows.band_count(), self.count + 1);
+        let first = |changed: &mut [Vec<bool>]| {
+            let mut flags = vec![false; bands * levels];
+            for changed in changed {
+                changed.resize(bands, true);
+                flags.iter_mut().step_by(levels).zip(&*changed).for_each(|(flag, changed)| *flag |= changed);
+            }
+            flags
+        };
+        let changed = &mut activity.changed;
+        let flags = if self.sweeps_both() {
+            [first(changed), Vec::new()]
+        } else {
+            let [x, y] = changed;
+            [first(std::slice::from_mut(x)), first(std::slice::from_mut(y))]
+        };
+        UnderWay { flags, seen: Seen::default() }
+    }
+
+    /// Does one stage of the work, in the arrays of [`Steps::take`].
+    pub fn go_on(&self, under_way: &mut UnderWay, stage: Stage, even: [&mut [T]; 2], odd: [&mut [T]; 2]) {
+        if self.owned.is_empty() {
+            return;
+        }
+        let UnderWay { flags: [flags, flags_of_y], seen } = under_way;
+        let ([even_x, even_y], [odd_x, odd_y]) = (even, odd);
         let threads = if even_x.len() < PARALLEL_FROM { 1 } else { self.threads };
-        let seen = if self.rows.share_in_runs() < 0.5 || self.rows.couples(&self.terms) {
-            // A list that has been read serves both coordinates.
-            let even_odd = ([even_x, even_y], [odd_x, odd_y]);
-            self.take_axes([0, 1], [changed_x, changed_y], even_odd, threads)
+        if self.sweeps_both() {
+            let rows = Stretch { even: [even_x, even_y], odd: [odd_x, odd_y], flags };
+            seen.add(self.take_axes(stage, [0, 1], rows, threads));
         } else {
             let each = threads.div_ceil(2);
-            let mut x = || self.take_axes([0], [changed_x], ([even_x], [odd_x]), each);
-            let mut y = || self.take_axes([1], [changed_y], ([even_y], [odd_y]), each);
-            let (mut x, y) = if threads > 1 { rayon::join(x, y) } else { (x(), y()) };
-            x.add(y);
-            x
-        };
+            let x = Stretch { even: [even_x], odd: [odd_x], flags };
+            let y = Stretch { even: [even_y], odd: [odd_y], flags: flags_of_y };
+            let x = || self.take_axes(stage, [0], x, each);
+            let y = || self.take_axes(stage, [1], y, each);
+            let (x, y) = if threads > 1 { rayon::join(x, y) } else { (x(), y()) };
+            seen.add(x);
+            seen.add(y);
+        }
+    }
+
+    /// Ends the steps; see [`Steps::take`].
+    pub fn end(&self, under_way: UnderWay, activity: &mut Activity) -> Vec<bool> {
+        let UnderWay { flags: [flags, flags_of_y], seen } = under_way;
+        let of_y = if flags_of_y.is_empty() { &flags } else { &flags_of_y };
+        for (flags, changed) in [&flags, of_y].into_iter().zip(&mut activity.changed) {
+            let last = flags.iter().skip(self.count).step_by(self.count + 1);
+            // Those of others move on without being seen.
+            let last = last.enumerate().map(|(band, flag)| *flag || !self.owned.contains(&band));
+            last.zip(changed).for_each(|(flag, changed)| *changed = flag);
+        }
         let followers: usize = self.owned.clone().map(|band| self.rows.followers(band)).sum();
         let due = 2 * (followers * self.count) as u64;
         activity.due = activity.due.saturating_add(due);
@@ -154,49 +225,46 @@ impl<T: Real> Steps<'_, T> {
 
     fn take_axes<const P: usize>(
         &self,
+        stage: Stage,
         axes: [usize; P],
-        mut changed: [&mut Vec<bool>; P],
-        (even, odd): ([&mut [T]; P], [&mut [T]; P]),
+        mut rows: Stretch<'_, T, P>,
         threads: usize,
     ) -> Seen {
-        let (bands, levels) = (self.rows.band_count(), self.count + 1);
-        let mut flags = vec![false; bands * levels];
-        for changed in &mut changed {
-            changed.resize(bands, true);
-            flags.iter_mut().step_by(levels).zip(&**changed).for_each(|(flag, changed)| *flag |= changed);
-        }
+        let levels = self.count + 1;
+        let (all, Range { start, end }) = (self.due(0), self.owned.clone());
         let mut seen = Seen::default();
-        if self.owned.is_empty() {
+        if stage == Stage::Rim {
+            let before = (all.start < start).then(|| all.start..start + levels);
+            let after = (end < all.end).then(|| end - levels..all.end);
+            let sloping = |rim: &Range<usize>, level: usize| {
+                let due = self.due(level);
+                if rim.start == all.start { due.start..start + level } else { end - level..due.end }
+            };
+            let rims: Vec<Range<usize>> = before.into_iter().chain(after).collect();
+            self.take_fronts(axes, rows, &rims, sloping, &mut seen);
             return seen;
         }
-        let mut rows = Stretch { even, odd, flags: &mut flags };
-        let all = self.due(0);
-        let cuts = self.cuts(all.clone(), threads);
-        if cuts.len() == 2 {
-            Wavefront { steps: self, axes, stretch: 0..bands, rows: rows.lend() }
-                .run(|level| self.due(level), &mut seen);
-        } else {
-            let segments: Vec<Range<usize>> = cuts.windows(2).map(|ends| ends[0]..ends[1]).collect();
-            let shrinking = |segment: &Range<usize>, level: usize| {
-                let due = self.due(level);
-                let from = if segment.start == all.start { due.start } else { segment.start + level };
-                from..if segment.end == all.end { due.end } else { segment.end - level }
-            };
-            self.take_fronts(axes, rows.lend(), &segments, shrinking, &mut seen);
-            let inner = &cuts[1..cuts.len() - 1];
-            let wedges: Vec<Range<usize>> = inner.iter().map(|cut| cut - levels..cut + levels).collect();
-            let growing = |wedge: &Range<usize>, level: usize| {
-                let cut = wedge.start + levels;
-                cut - level..cut + level
-            };
-            self.take_fronts(axes, rows.lend(), &wedges, growing, &mut seen);
+        let outer = if stage == Stage::All { all.clone() } else { start..end };
+        let cuts = self.cuts(outer.clone(), threads);
+        if cuts.len() == 2 && outer == all {
+            let stretch = 0..self.rows.band_count();
+            Wavefront { steps: self, axes, stretch, rows }.run(|level| self.due(level), &mut seen);
+            return seen;
         }
-        for changed in changed {
-            let last = flags.iter().skip(self.count).step_by(levels);
-            // Those of others move on without being seen.
-            let last = last.enumerate().map(|(band, flag)| *flag || !self.owned.contains(&band));
-            last.zip(changed).for_each(|(flag, changed)| *changed = flag);
-        }
+        let segments: Vec<Range<usize>> = cuts.windows(2).map(|ends| ends[0]..ends[1]).collect();
+        let shrinking = |segment: &Range<usize>, level: usize| {
+            let due = self.due(level);
+            let from = if segment.start == all.start { due.start } else { segment.start + level };
+            from..if segment.end == all.end { due.end } else { segment.end - level }
+        };
+        self.take_fronts(axes, rows.lend(), &segments, shrinking, &mut seen);
+        let inner = &cuts[1..cuts.len() - 1];
+        let wedges: Vec<Range<usize>> = inner.iter().map(|cut| cut - levels..cut + levels).collect();
+        let growing = |wedge: &Range<usize>, level: usize| {
+            let cut = wedge.start + levels;
+            cut - level..cut + level
+        };
+        self.take_fronts(axes, rows, &wedges, growing, &mut seen);
         seen
     }
 

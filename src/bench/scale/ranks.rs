@@ -1,7 +1,7 @@
 //! Ranks that are timed, and what they say to each other, counted.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
@@ -43,11 +43,20 @@ impl Exchange for Counted {
         self.team.count()
     }
 
-    fn swap(&mut self, messages: &[(usize, Vec<u64>)], from: &[(usize, usize)]) -> Vec<Vec<u64>> {
-        let begin = Instant::now();
-        let received = self.team.swap(messages, from);
+    fn swap(
+        &mut self,
+        messages: &[(usize, Vec<u64>)],
+        from: &[(usize, usize)],
+        meanwhile: &mut dyn FnMut(),
+    ) -> Vec<Vec<u64>> {
+        let (begin, mut computed) = (Instant::now(), Duration::ZERO);
+        let received = self.team.swap_while(messages, from, &mut || {
+            let begin = Instant::now();
+            meanwhile();
+            computed = begin.elapsed();
+        });
         let mut tally = held(&self.tally);
-        tally.seconds += begin.elapsed().as_secs_f64();
+        tally.seconds += (begin.elapsed() - computed).as_secs_f64();
         tally.messages += from.len() as u64;
         tally.bytes += from.iter().map(|(_, words)| 8 * *words as u64).sum::<u64>();
         received
