@@ -90,18 +90,38 @@ impl Engine {
         let to_come = self.changes.iter().map(|change| change.from).filter(|&from| from > self.step.max(1));
         let to_come = to_come.chain(self.next_action());
         let until = to_come.min().map_or(usize::MAX, |from| from - 1 - self.step);
-        most.min(until).min(self.sweep.steps_together())
+        most.min(until).min(self.sweep.steps_together().saturating_sub(self.spare_bands()))
+    }
+
+    /// Bands that are to be known beyond those that steps taken together need: the ones that probes look at after the last.
+    fn spare_bands(&self) -> usize {
+        usize::from(self.probes.is_some() && self.sweep.domain().is_some())
     }
 
     /// Takes so many steps, as many as [`Engine::steps_at_once`] allows; the bits are those of single ones.
     /// Returns for each whether a particle is known to have moved farther in it than `farther` \[length\].
     pub fn advance_by(&mut self, count: usize, farther: Option<f64>) -> Vec<bool> {
-        self.receive_halo(count);
-        let led = Led { particles: &self.led, places: &self.leaders_ahead(count) };
-        let places = (&mut self.present, &mut self.previous);
-        let frame = self.body.frame.as_ref();
-        let moved = self.sweep.steps(&self.flock, frame, places, (count, led, farther), &mut self.activity);
-        self.step += count;
+        let spare = self.spare_bands();
+        self.receive_halo(count + spare);
+        let mut moved = Vec::with_capacity(count);
+        // Probes see each step, and the bands that those to come need are moved along.
+        let each = if self.probes().is_empty() { count } else { 1 };
+        for taken in (0..count).step_by(each) {
+            let beyond = count - taken - each + spare;
+            let led = Led { particles: &self.led, places: &self.leaders_ahead(each) };
+            let places = (&mut self.present, &mut self.previous);
+            let (frame, steps) = (self.body.frame.as_ref(), (each, led, farther));
+            moved.extend(self.sweep.steps_around(
+                beyond,
+                &self.flock,
+                frame,
+                places,
+                steps,
+                &mut self.activity,
+            ));
+            self.step += each;
+            self.record_probes();
+        }
         self.settled = None;
         if farther.is_some() { self.on_any_rank(moved) } else { moved }
     }
@@ -110,6 +130,7 @@ impl Engine {
     pub(super) fn return_to(&mut self, step: usize, places: &Vectors, activity: Activity) {
         self.step = step;
         self.settled = None;
+        self.forget_probes_after(step);
         self.follow_ramp();
         self.present.clone_from(places);
         self.is_whole = self.team.is_none();

@@ -256,6 +256,19 @@ impl Sweep {
         &self,
         flock: &Flock,
         frame: Option<&Frame>,
+        places: (&mut Vectors, &mut Vectors),
+        steps: (usize, Led<'_>, Option<f64>),
+        activity: &mut Activity,
+    ) -> Vec<bool> {
+        self.steps_around(0, flock, frame, places, steps, activity)
+    }
+
+    /// The same, with so many bands around those of this rank, which are moved along.
+    pub(crate) fn steps_around(
+        &self,
+        beyond: usize,
+        flock: &Flock,
+        frame: Option<&Frame>,
         (present, next): (&mut Vectors, &mut Vectors),
         (count, led, farther): (usize, Led<'_>, Option<f64>),
         activity: &mut Activity,
@@ -267,7 +280,10 @@ impl Sweep {
         let reference = [&flock.reference.x[..], &flock.reference.y[..]];
         let frame = frame.map(|frame| LaggedFrame { frame, reference });
         let terms = self.terms.of(flock);
-        let owned = self.bands(rows);
+        let Range { start, end } = self.bands(rows);
+        // A rank without bands has none around them.
+        let beyond = if start < end { beyond } else { 0 };
+        let owned = start.saturating_sub(beyond)..(end + beyond).min(rows.band_count());
         let steps = Steps { rows, owned, terms, rest, force, frame, led, count, farther, threads };
         let even = [&mut present.x[..], &mut present.y[..]];
         let farther = steps.take(activity, even, [&mut next.x[..], &mut next.y[..]]);
