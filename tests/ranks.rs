@@ -11,7 +11,8 @@ use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, SharedError, require_shareable, run_shared, run_watched};
 use flockform::continuum::shares::{Exchanged, Shares};
 use flockform::engine::Engine;
-use flockform::engine::observer::Observer;
+use flockform::engine::observer::{EachStep, Observer};
+use flockform::engine::probes::ProbeSeries;
 use flockform::engine::shared::NotShared;
 use flockform::engine::state::EngineState;
 use flockform::flock::vectors::Vectors;
@@ -35,6 +36,8 @@ struct End {
     roles: String,
     /// Steps that were looked at, and a hash of all places at each.
     seen: Vec<(usize, u64)>,
+    /// Of a body in parts.
+    probes: Vec<ProbeSeries>,
 }
 
 impl End {
@@ -50,6 +53,7 @@ impl End {
             breaks: format!("{:?}", engine.breaks()),
             roles: format!("{:?}", engine.roles()),
             seen,
+            probes: Vec::new(),
         }
     }
 }
@@ -619,6 +623,7 @@ fn parted(scene: &Scene, every: usize, ranks: usize) -> End {
             (engine.step(), format!("{:?}", outcome.reason)),
             (outcome.residual, sums),
             count,
+            engine.probes().to_vec(),
         )
     });
     let (step, reason) = ends[0].3.clone();
@@ -631,6 +636,7 @@ fn parted(scene: &Scene, every: usize, ranks: usize) -> End {
         breaks: "[]".to_owned(),
         roles: String::new(),
         seen: Vec::new(),
+        probes: Vec::new(),
     };
     for one in &ends {
         assert_eq!((&one.3.0, &one.3.1), (&end.step, &end.reason));
@@ -645,14 +651,28 @@ fn parted(scene: &Scene, every: usize, ranks: usize) -> End {
     end.places.extend(all(&|r| ends[r].1.iter().flatten().copied().collect()));
     let roles: Vec<_> = ends.iter().flat_map(|one| one.2.clone()).collect();
     end.roles = format!("{roles:?}");
+    // Each is on one rank; the lists of the test are ascending.
+    end.probes = ends.iter().flat_map(|one| one.6.clone()).collect();
     end.seen.push((ends.iter().map(|one| one.5).max().unwrap_or(0), 0));
     end
 }
 
+/// The histories of a run alone that is looked at in each step.
+fn probed(scene: &Scene) -> Vec<ProbeSeries> {
+    let plan = planned(scene);
+    let mut probes: Vec<_> = plan.probes.iter().map(|&index| ProbeSeries::new(index)).collect();
+    let mut see = |engine: &Engine, _: f64| {
+        probes.iter_mut().for_each(|probe| probe.record(engine));
+        ControlFlow::Continue(())
+    };
+    run_watched(plan, &mut EachStep(&mut see));
+    probes
+}
+
 fn assert_parted_the_same(name: &str, sets: &[&str], every: usize) {
     let scene = load(name, sets);
-    let expected = End { seen: Vec::new(), ..alone(&scene, every) };
-    for ranks in [2, 3, 5, 8] {
+    let expected = End { seen: Vec::new(), probes: probed(&scene), ..alone(&scene, every) };
+    for ranks in [1, 2, 3, 5, 8] {
         let found = End { seen: Vec::new(), ..parted(&scene, every, ranks) };
         let what = format!("{name} {sets:?} in {ranks} parts");
         assert_eq!(
@@ -661,6 +681,7 @@ fn assert_parted_the_same(name: &str, sets: &[&str], every: usize) {
             "{what}"
         );
         assert!(found.roles == expected.roles, "{what}: roles");
+        assert!(found.probes == expected.probes, "{what}: probes");
         assert!(found == expected, "{what}");
     }
 }
@@ -680,5 +701,26 @@ fn a_body_laid_out_in_parts_has_the_bits_of_one_laid_out_as_a_whole() {
         ("lattice-hexagonal", &[]),
     ] {
         assert_parted_the_same(name, &[&small[..], more].concat(), 25);
+    }
+}
+
+#[test]
+fn probes_of_a_body_in_parts_are_those_of_a_run_alone() {
+    let body = "body.shape={kind=\"grid\",columns=120,rows=9}";
+    let probes = "record.probes=[1,2,300,301,455,540,541,700,1000,1080]";
+    let leaders = "roles=[{region={kind=\"edge\",side=\"left\"},role=\"clamped\"},\
+         {region={kind=\"edge\",side=\"right\"},role=\"leader\",motion={kind=\"velocity\",per_step=[0.6,0.0]}}]";
+    for (name, more) in [
+        ("tension", &["frame=none"][..]),
+        // Looked at now and then: most steps are taken together.
+        ("tension", &["frame=\"lagged\""]),
+        ("tension-immediate", &[]),
+        ("poisson-term", &["frame=none"]),
+        ("tension", &["frame=none", "stop.tolerance=0.02", leaders]),
+        // It diverges.
+        ("tension", &["frame=none", "update.damping=1.5", leaders]),
+        ("lattice-hexagonal", &["frame=none"]),
+    ] {
+        assert_parted_the_same(name, &[&[body, probes, "stop.steps=90"][..], more].concat(), 40);
     }
 }

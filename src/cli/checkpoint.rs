@@ -11,7 +11,7 @@ use flockform::engine::Engine;
 use flockform::engine::state::EngineState;
 use flockform::export::checkpoint::{Checkpoint, CheckpointError, RunRequest};
 use flockform::export::report::RunRecorder;
-use flockform::export::{ExportError, OutputFolder, VtkSeries, unfinished};
+use flockform::export::{ExportError, OutputFolder, VtkSeries, probes_of_parts, unfinished};
 use flockform::ranks::Team;
 use flockform::scene::Scene;
 
@@ -201,7 +201,7 @@ impl<'a> Checkpointer<'a> {
     pub fn keep_parts(
         &mut self,
         folder: Option<&mut OutputFolder>,
-        (engine, residual): (&Engine, f64),
+        (engine, residual, probes): (&Engine, f64, &[usize]),
         frames: Option<&mut VtkSeries>,
         team: &Team,
     ) -> bool {
@@ -209,10 +209,11 @@ impl<'a> Checkpointer<'a> {
         let path = folder.as_ref().map_or(&b""[..], |folder| folder.folder().as_os_str().as_encoded_bytes());
         let paths = team.each_bytes(path);
         let state = EngineState::of(engine);
-        let first = engine.body().id(engine.body().owned().start) - 1;
+        let first = engine.body().first() + engine.body().owned().start;
         let parts = team.each([first as u64, state.count() as u64]);
         let of = (&self.asked, self.scene, self.digest);
-        let own = Checkpoint::new(of, (state, residual), (&[], &[], &[], None), self.stepping());
+        let probes = probes_of_parts(engine, probes, team);
+        let own = Checkpoint::new(of, (state, residual), (&[], &probes, &[], None), self.stepping());
         let written = match &folder {
             Some(_) => frames.map_or(Ok(()), VtkSeries::sync),
             None => own.write_part(Path::new(&*String::from_utf8_lossy(&paths[0])), team.rank()),

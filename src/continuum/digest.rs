@@ -41,7 +41,7 @@ fn digest_of(plan: &Plan, team: Option<&Team>) -> u64 {
     };
     let Plan { setup, stop, probes, .. } = plan;
     let Setup { body, flock, update, present_radius, roles, changes, cuts, actions, ramp, .. } = setup;
-    let (owned, first) = (body.owned(), body.part.as_ref().map_or(0, |part| part.first));
+    let (owned, first) = (body.owned(), body.first());
     let starts = &flock.neighbours.starts;
     let bonds = starts[owned.start] as usize..starts[owned.end] as usize;
     each(&mut digest, &|digest| digest.numbers(&body.reference.x[owned.clone()]));

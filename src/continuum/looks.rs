@@ -21,9 +21,9 @@ pub struct Looks {
 }
 
 impl Looks {
-    /// Looks at each step if `every` or if there are probes.
+    /// Looks at each step if `every` or if there are probes that the engine does not record itself.
     pub fn new(plan: &Plan, every: bool) -> Self {
-        let every = every || !plan.probes.is_empty();
+        let every = every || (!plan.probes.is_empty() && plan.setup.probes.is_none());
         let bound = if every { 1 } else { (UPDATES_BETWEEN_LOOKS / plan.count()).max(1) };
         Self { most: 1, bound, last: (Stopwatch::start(), 0) }
     }

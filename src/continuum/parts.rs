@@ -24,9 +24,8 @@ use crate::sweep::rows::usual_band;
 
 /// The key for which a scene has to be laid out as a whole, on every rank; `None` where each can lay out its part.
 pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
-    let record = &scene.record;
     let weights = matches!(scene.weights, Some(Weights::Solved | Weights::Gradient { .. }));
-    let keys: [(bool, &str); 14] = [
+    let keys: [(bool, &str); 13] = [
         (!matches!(scene.body, BodySource::Cut(_)), "body.shape"),
         (scene.is_fitted, "body.outline"),
         (matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. }), "neighbours.kind"),
@@ -40,7 +39,6 @@ pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
         (scene.fracture.is_some(), "fracture"),
         (!scene.cuts.is_empty(), "cuts"),
         (!scene.actions.is_empty(), "actions"),
-        (!record.probes.is_empty(), "record.probes"),
     ];
     let of_role = |(k, entry): (usize, &RoleEntry)| {
         let RoleEntry { region, role, axis, when, motion, .. } = entry;

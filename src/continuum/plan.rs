@@ -7,6 +7,7 @@ use super::damping::along_outline;
 use super::layout::{Layout, ReferenceMotion, held_components, no_particle, refuse_pieces};
 use super::parts::{Parting, agreed, require_connected};
 use super::{places, weights};
+use crate::engine::probes::ProbeSeries;
 use crate::engine::setup::{Conduct, RoleChange, Setup, of_first_roles};
 use crate::flock::action::{Action, ActionKind};
 use crate::flock::body::{Body, MOST_ENTRIES};
@@ -34,7 +35,7 @@ pub struct Plan {
     pub stop: Stop,
     /// Diagonal of the body's bounds \[length\].
     pub diagonal: f64,
-    /// Indices of the particles kept at every step.
+    /// Indices, in the whole body, of the particles whose history is kept.
     pub probes: Vec<usize>,
     /// The outline of the body's shape, where it has one.
     pub outline: Option<Outline>,
@@ -137,6 +138,9 @@ impl Plan {
             },
             ..Setup::new(body, flock, roles, update)
         };
+        if setup.body.part.is_some() && !probes.is_empty() {
+            setup.probes = Some(probes.iter().map(|&index| ProbeSeries::new(index)).collect());
+        }
         make_cuts(&mut setup, scene);
         take_first_roles(&mut setup);
         Ok(Self { setup, stop: scene.stop, diagonal, probes, outline, resultants })
@@ -399,7 +403,7 @@ fn flock(
 
 fn probes(scene: &Scene, body: &Body) -> Result<Vec<usize>, SceneError> {
     let probe = |(n, &id): (usize, &usize)| {
-        body.particle(id).ok_or_else(|| {
+        body.index_of(id).ok_or_else(|| {
             let message = no_particle(id, body);
             scene.refuse(&format!("record.probes[{n}]"), message, "name a particle of the body")
         })

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::mechanics::Mechanics;
 use crate::engine::Engine;
+pub use crate::engine::probes::ProbeSeries;
 use crate::engine::serde_impls;
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
@@ -41,34 +42,6 @@ impl Snapshot {
             pe2: (0..count).map(|i| engine.pe2(i)).collect(),
             broken: engine.breaks().iter().map(|b| b.pair).collect(),
         }
-    }
-}
-
-/// The history of one particle: entry `t` is step `t`, the start included.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub struct ProbeSeries {
-    /// Index of the particle.
-    pub particle: usize,
-    /// Present positions \[length, world frame\].
-    #[serde(with = "serde_impls::points")]
-    pub positions: Vectors,
-    /// First pseudo-energy \[length^2\].
-    pub pe1: Vec<f64>,
-    /// Second pseudo-energy \[length\].
-    pub pe2: Vec<f64>,
-}
-
-impl ProbeSeries {
-    /// A history without entries.
-    pub fn new(particle: usize) -> Self {
-        Self { particle, ..Self::default() }
-    }
-
-    /// Appends the particle's present state; to be called once at the start and once after every step.
-    pub fn record(&mut self, engine: &Engine) {
-        self.positions.push(engine.present().get(self.particle));
-        self.pe1.push(engine.pe1(self.particle));
-        self.pe2.push(engine.pe2(self.particle));
     }
 }
 

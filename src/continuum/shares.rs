@@ -84,12 +84,14 @@ impl PartShares {
         let parting = Parting::alone(scene, ranks)?;
         let rank = parting.largest();
         let largest = Plan::of_part_alone(scene, &parting, rank)?;
-        let Setup { body, flock, update, roles, .. } = &largest.setup;
+        let Setup { body, flock, update, roles, probes, .. } = &largest.setup;
         let part = body.part.as_ref().map(Part::held);
         let share = Share { rank, ranks, part, ..Share::whole() };
         let mut sweep = Sweep::compile_share(*update, flock, roles, share);
         let takes_several = sweep.takes_several(body.frame.as_ref());
-        let (steps, halo) = sweep.domain_mut().map_or((0, 0), |domain| domain.needs(takes_several).most());
+        let (steps, halo) = sweep
+            .domain_mut()
+            .map_or((0, 0), |domain| domain.needs(takes_several).most(usize::from(probes.is_some())));
         let (particles, halo_bytes) = (parting.counts(), PLACE * halo);
         Ok(Some(Self { particles, steps, halo_bytes, largest }))
     }

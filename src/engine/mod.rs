@@ -14,6 +14,7 @@ pub mod load;
 pub mod movement;
 pub mod observer;
 pub mod path;
+pub mod probes;
 pub(crate) mod serde_impls;
 pub mod setup;
 pub mod several;
@@ -42,6 +43,7 @@ use leaders::Led;
 use load::Load;
 use movement::Movement;
 use path::Path;
+use probes::ProbeSeries;
 use setup::{Conduct, RoleChange, Setup};
 
 /// A body on its way; positions in \[length, world frame\], shape \[count\].
@@ -81,6 +83,8 @@ pub struct Engine {
     settled: Option<Vectors>,
     /// Of a body that is put to rest part by part.
     path: Option<Path>,
+    /// Histories of the probed particles of this part; none where the body is whole or none are probed.
+    probes: Option<Vec<ProbeSeries>>,
     /// The ranks that share the body.
     team: Option<(Team, Share)>,
     /// Whether the positions of all particles are known here; of a shared body, otherwise, those of its own.
@@ -111,7 +115,11 @@ impl Engine {
             loads,
             ramp,
             free_edge,
+            probes,
         } = setup;
+        let owned = body.first() + body.owned().start..body.first() + body.owned().end;
+        let own = |probe: &ProbeSeries| owned.contains(&probe.particle);
+        let probes = probes.map(|all| all.into_iter().filter(own).collect());
         let present_neighbours = present_radius.map(|radius| PresentNeighbours {
             radius,
             grid: CellGrid::default(),
@@ -141,6 +149,7 @@ impl Engine {
             load: Load::new(ramp, loads),
             settled: None,
             path: None,
+            probes,
             team: None,
             is_whole: true,
         };
@@ -156,6 +165,7 @@ impl Engine {
             }
         }
         engine.after_role_change();
+        engine.record_probes();
         engine
     }
 
@@ -283,6 +293,7 @@ impl Engine {
         if self.body.part.is_some() || self.team.as_ref().is_none_or(|(team, _)| team.is_first()) {
             self.activity.count_whole(self.sweep.followers());
         }
+        self.record_probes();
     }
 
     /// Puts particles where they have been seen \[length\], in place of where the last step sent them; frame

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::probes::ProbeSeries;
 use crate::flock::action::Action;
 use crate::flock::body::Body;
 use crate::flock::condition::Condition;
@@ -42,6 +43,8 @@ pub struct Setup {
     pub ramp: Option<usize>,
     /// Of a body fitted to its outline whose rule is a material.
     pub free_edge: Option<Arc<FreeEdge>>,
+    /// Histories that the engine goes on with, those of other ranks among them; only where each rank has a part of the body.
+    pub probes: Option<Vec<ProbeSeries>>,
 }
 
 /// A role that some particles take.
@@ -128,6 +131,7 @@ impl Setup {
             loads: Vec::new(),
             ramp: None,
             free_edge: None,
+            probes: None,
         }
     }
 }

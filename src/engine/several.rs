@@ -91,23 +91,37 @@ impl Engine {
         let to_come = self.changes.iter().map(|change| change.from).filter(|&from| from > self.step.max(1));
         let to_come = to_come.chain(self.next_action());
         let until = to_come.min().map_or(usize::MAX, |from| from - 1 - self.step);
-        most.min(until).min(self.sweep.steps_together())
+        most.min(until).min(self.sweep.steps_together().saturating_sub(self.spare_bands()))
+    }
+
+    /// Bands that are to be known beyond those that steps taken together need: the ones that probes look at after the last.
+    fn spare_bands(&self) -> usize {
+        usize::from(self.probes.is_some() && self.sweep.domain().is_some())
     }
 
     /// Takes so many steps, as many as [`Engine::steps_at_once`] allows; the bits are those of single ones.
     /// Returns for each whether a particle is known to have moved farther in it than `farther` \[length\].
     pub fn advance_by(&mut self, count: usize, farther: Option<f64>) -> Vec<bool> {
-        let led = Led { particles: &self.led, places: &self.leaders_ahead(count) };
-        let steps = self.sweep.steps_to_take(&self.flock, self.body.frame.as_ref(), (count, led, farther));
-        let ranks = self.team.as_ref().zip(self.sweep.domain()).filter(|_| !self.is_whole);
-        let ranks = ranks.map(|((team, _), domain)| (team, domain));
-        let places = [&mut self.present, &mut self.previous];
-        let moved = take_steps(&steps, ranks, places, &mut self.activity);
-        if count % 2 == 1 {
-            std::mem::swap(&mut self.present, &mut self.previous);
+        let spare = self.spare_bands();
+        let mut moved = Vec::with_capacity(count);
+        // Probes see each step, and the bands that those to come need are moved along.
+        let each = if self.probes().is_empty() { count } else { 1 };
+        for taken in (0..count).step_by(each) {
+            let beyond = count - taken - each + spare;
+            let led = Led { particles: &self.led, places: &self.leaders_ahead(each) };
+            let frame = self.body.frame.as_ref();
+            let steps = self.sweep.steps_to_take(&self.flock, frame, (each, led, farther), beyond);
+            let ranks = self.team.as_ref().zip(self.sweep.domain()).filter(|_| taken == 0 && !self.is_whole);
+            let halo = ranks.map(|((team, _), domain)| (team, domain.halo(count + spare)));
+            let places = [&mut self.present, &mut self.previous];
+            moved.extend(take_steps(&steps, (halo, beyond), places, &mut self.activity));
+            if each % 2 == 1 {
+                std::mem::swap(&mut self.present, &mut self.previous);
+            }
+            self.is_whole = self.team.is_none();
+            self.step += each;
+            self.record_probes();
         }
-        self.is_whole = self.team.is_none();
-        self.step += count;
         self.settled = None;
         if farther.is_some() { self.on_any_rank(moved) } else { moved }
     }
@@ -116,6 +130,7 @@ impl Engine {
     pub(super) fn return_to(&mut self, step: usize, places: &Vectors, activity: Activity) {
         self.step = step;
         self.settled = None;
+        self.forget_probes_after(step);
         self.follow_ramp();
         self.present.clone_from(places);
         self.is_whole = self.team.is_none();

@@ -152,21 +152,20 @@ impl Engine {
     }
 }
 
-/// Takes several steps: of a body that is shared what needs nothing of the other ranks while the halo is on its way. The
-/// places are those of now and those before the last step.
+/// Takes several steps: of a body that is shared what needs nothing of the other ranks while the halo is on its way, unless
+/// bands `beyond` those of this rank are moved as well. The places are those of now and those before the last step.
 pub(super) fn take_steps(
     steps: &Steps<'_, f64>,
-    ranks: Option<(&Team, &Domain)>,
+    (halo, beyond): (Option<(&Team, Halo)>, usize),
     [present, previous]: [&mut Vectors; 2],
     activity: &mut Activity,
 ) -> Vec<bool> {
     let mut under_way = steps.begin(activity);
     let mut stage = Stage::All;
-    if let Some((team, domain)) = ranks {
-        let halo = domain.halo(steps.count);
+    if let Some((team, halo)) = halo {
         let (sent, sizes) = messages(&halo, &[&*present]);
         let received = team.swap_while(&sent, &sizes, &mut || {
-            if steps.has_inside() {
+            if beyond == 0 && steps.has_inside() {
                 steps.go_on(&mut under_way, Stage::Inside, both(present), both(previous));
                 stage = Stage::Rim;
             }

@@ -53,7 +53,7 @@ impl<'a> EngineState<'a> {
     /// The state of an engine between two steps; of a part of a body that of its own particles, which are numbered as in the
     /// whole body.
     pub fn of(engine: &'a Engine) -> Self {
-        let (owned, first) = (engine.body.owned(), engine.body.part.as_ref().map_or(0, |part| part.first));
+        let (owned, first) = (engine.body.owned(), engine.body.first());
         let leading = |led: &Led| Led { particle: first + led.particle, ..*led };
         let flock = &engine.flock;
         let packed = |byte: usize, bonds: &crate::flock::fracture::Bonds| {
@@ -118,7 +118,7 @@ impl<'a> EngineState<'a> {
         setup: &Setup,
     ) -> Result<EngineState<'static>, WrongState> {
         let body = &setup.body;
-        let first = body.part.as_ref().map_or(0, |part| part.first);
+        let first = body.first();
         let exact = body.part.as_ref().map_or(0..body.count(), |part| part.exact.clone());
         // Those that are there for the others to have neighbours are never looked at.
         let (mut present, mut roles) = (Vectors::clone(&body.reference), setup.roles.clone());

@@ -214,7 +214,7 @@ pub fn write_probes(
     let rows = (0..steps).flat_map(|step| {
         probes.iter().filter(move |probe| step < probe.positions.len()).map(move |probe| {
             let [x, y] = probe.positions.get(step);
-            let id = body.id(probe.particle);
+            let id = body.id_of(probe.particle);
             ProbeRow { step, id, x, y, pe1: probe.pe1[step], pe2: probe.pe2[step] }
         })
     });

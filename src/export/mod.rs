@@ -176,19 +176,47 @@ pub fn write_all(
     Ok((written, summary))
 }
 
-/// Writes the table of particles and, last, the summary of a run of which each rank has a part, by all ranks together. The
-/// first one has the `folder`; it alone can fail.
+/// The histories of all probed particles, whose indices in the whole body are given, in their order; each rank has those of its
+/// own part, and the first one receives them.
+pub fn probes_of_parts(engine: &Engine, probes: &[usize], team: &Team) -> Vec<ProbeSeries> {
+    if probes.is_empty() {
+        return Vec::new();
+    }
+    let own = engine.probes();
+    if !team.is_first() {
+        team.send_bytes(&postcard::to_stdvec(own).expect("a history can be written"));
+        return Vec::new();
+    }
+    let mut all = own.to_vec();
+    for rank in 1..team.count() {
+        let others: Vec<ProbeSeries> =
+            postcard::from_bytes(&team.receive_bytes(rank)).expect("as it was sent");
+        all.extend(others);
+    }
+    let of = |&index: &usize| all.iter().find(|probe| probe.particle == index).cloned();
+    probes.iter().filter_map(of).collect()
+}
+
+/// Writes the tables of particles and of probes and, last, the summary of a run of which each rank has a part, by all ranks
+/// together. The first one has the `folder`; it alone can fail.
 ///
 /// # Errors
 /// The first file that cannot be written.
 pub fn write_all_of_parts(
     folder: Option<&OutputFolder>,
-    (scene, outcome): (&Scene, &Outcome),
+    (scene, outcome, probes): (&Scene, &Outcome, &[usize]),
     mut timings: Timings,
     team: &Team,
 ) -> Result<Summary, ExportError> {
     let start = Instant::now();
+    let probes = probes_of_parts(&outcome.engine, probes, team);
     let written = csv::write_final_of_parts(folder, &outcome.engine, team);
+    let written = written.and_then(|()| match folder {
+        Some(folder) if !probes.is_empty() => {
+            csv::write_probes(folder, outcome.engine.body(), &probes).map(drop)
+        }
+        _ => Ok(()),
+    });
     timings.output += start.elapsed();
     // Sums over all parts: the others wait for this one even if it could not write.
     let summary = Summary::new(scene, outcome, None, timings);

@@ -338,8 +338,25 @@ impl Body {
 
     /// The id of a particle in files and messages.
     pub fn id(&self, particle: usize) -> usize {
-        let first = self.part.as_ref().map_or(0, |part| part.first);
-        self.numbering.as_ref().map_or(first + particle + 1, |numbering| numbering.id(particle) as usize)
+        self.id_of(self.first() + particle)
+    }
+
+    /// The id of the particle with this index in the whole body.
+    pub fn id_of(&self, index: usize) -> usize {
+        self.numbering.as_ref().map_or(index + 1, |numbering| numbering.id(index) as usize)
+    }
+
+    /// The index in the whole body of the particle that the user calls so.
+    pub fn index_of(&self, id: usize) -> Option<usize> {
+        match &self.part {
+            Some(part) => id.checked_sub(1).filter(|&index| index < part.total),
+            None => self.particle(id),
+        }
+    }
+
+    /// Index in the whole body of the first particle that stands here.
+    pub fn first(&self) -> usize {
+        self.part.as_ref().map_or(0, |part| part.first)
     }
 
     /// Particles of the whole body, those of the frame included.
@@ -360,10 +377,9 @@ impl Body {
 
     /// The particle that the user calls so, if it stands here.
     pub fn particle(&self, id: usize) -> Option<usize> {
-        let first = self.part.as_ref().map_or(0, |part| part.first);
         match &self.numbering {
             Some(numbering) => numbering.particle(id),
-            None => id.checked_sub(1 + first).filter(|&particle| particle < self.count()),
+            None => id.checked_sub(1 + self.first()).filter(|&particle| particle < self.count()),
         }
     }
 

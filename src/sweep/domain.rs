@@ -85,9 +85,12 @@ impl Needs {
         Self { owned, steps: 0, needed: vec![all; MOST_STEPS + 1] }
     }
 
-    /// Most steps together, and how many particles of others they need; of a rank that looks at each step all that it has.
-    pub fn most(&self) -> (usize, usize) {
-        (self.steps, self.needed[self.steps].len() - self.owned.len())
+    /// Most steps together, if so many bands are to be known beyond those that they need, and how many particles of others all
+    /// that is; of a rank that looks at each step all that it has.
+    pub fn most(&self, spare: usize) -> (usize, usize) {
+        let steps = self.steps.saturating_sub(spare);
+        let needed = if steps == 0 { 0 } else { self.steps };
+        (steps, self.needed[needed].len() - self.owned.len())
     }
 
     /// For another rank.

@@ -261,7 +261,7 @@ impl Sweep {
         (count, led, farther): (usize, Led<'_>, Option<f64>),
         activity: &mut Activity,
     ) -> Vec<bool> {
-        let steps = self.steps_to_take(flock, frame, (count, led, farther));
+        let steps = self.steps_to_take(flock, frame, (count, led, farther), 0);
         let farther = steps.take(activity, [&mut present.x, &mut present.y], [&mut next.x, &mut next.y]);
         if count % 2 == 1 {
             std::mem::swap(present, next);
@@ -269,17 +269,22 @@ impl Sweep {
         farther
     }
 
-    /// The steps of [`Sweep::steps`], before they are taken.
+    /// The steps of [`Sweep::steps`], before they are taken, with so many bands around those of this rank, which are moved along.
     pub(crate) fn steps_to_take<'a>(
         &'a self,
         flock: &'a Flock,
         frame: Option<&'a Frame>,
         (count, led, farther): (usize, Led<'a>, Option<f64>),
+        beyond: usize,
     ) -> Steps<'a, f64> {
         let rows = self.rows.as_ref().expect("a sweep that takes several steps has rows");
         let [rest, force] = [&flock.rest, &flock.forces].map(|points| points.as_ref().map(both));
         let frame = frame.map(|frame| LaggedFrame { frame, reference: both(&flock.reference) });
-        let (terms, owned, threads) = (self.terms.of(flock), self.bands(rows), rayon::current_num_threads());
+        let (terms, threads) = (self.terms.of(flock), rayon::current_num_threads());
+        let Range { start, end } = self.bands(rows);
+        // A rank without bands has none around them.
+        let beyond = if start < end { beyond } else { 0 };
+        let owned = start.saturating_sub(beyond)..(end + beyond).min(rows.band_count());
         Steps { rows, owned, terms, rest, force, frame, led, count, farther, threads }
     }
 

@@ -40,6 +40,8 @@ impl RunArguments {
 struct PartObserver<'a> {
     team: &'a Team,
     scene: &'a Scene,
+    /// Indices of the probed particles in the whole body.
+    probes: Vec<usize>,
     looks: Looks,
     progress: Option<Progress>,
     /// Of the first rank.
@@ -63,8 +65,8 @@ impl PartObserver<'_> {
     }
 
     fn keep(&mut self, engine: &Engine, residual: f64) -> bool {
-        let Self { folder, frames, checkpointer, team, .. } = self;
-        checkpointer.keep_parts(folder.as_mut(), (engine, residual), frames.as_mut(), team)
+        let Self { folder, frames, checkpointer, team, probes, .. } = self;
+        checkpointer.keep_parts(folder.as_mut(), (engine, residual, probes), frames.as_mut(), team)
     }
 
     /// The last step is written in any case.
@@ -114,7 +116,7 @@ pub fn run(
     start: Instant,
 ) -> Result<ExitCode, Refusal> {
     let common = prepared.common();
-    let Prepared { left, asked, scene, words, plan, digest, .. } = prepared;
+    let Prepared { left, asked, scene, words, mut plan, digest, .. } = prepared;
     begin.agree(common)?;
     let mut folder: Option<OutputFolder> = None;
     let mut frames = None;
@@ -137,6 +139,7 @@ pub fn run(
     let mut observer = PartObserver {
         team,
         scene: &scene,
+        probes: plan.probes.clone(),
         looks: Looks::new(&plan, false),
         progress: team.is_first().then(|| Progress::of_steps(arguments.output.quiet, steps_of(&scene))),
         folder,
@@ -147,6 +150,9 @@ pub fn run(
         writing: Duration::ZERO,
     };
     begin.begin(common)?;
+    if let (Some(probes), Some(left)) = (&mut plan.setup.probes, &left) {
+        *probes = left.checkpoint.probes.to_vec();
+    }
     let from = left.map(|left| (left.checkpoint.engine, left.checkpoint.residual));
     let outcome = run_to_equilibrium_shared(&scene, plan, from, team, &mut observer);
     let outcome = outcome.map_err(|error| match error {
@@ -173,7 +179,8 @@ pub fn run(
     }
     let timings = Timings { setup, steps: elapsed.saturating_sub(writing), output: writing };
     let folder = observer.folder.take();
-    let summary = write_all_of_parts(folder.as_ref(), (&scene, &outcome), timings, team)?;
+    let results = (&scene, &outcome, &observer.probes[..]);
+    let summary = write_all_of_parts(folder.as_ref(), results, timings, team)?;
     let Some(folder) = folder else { return Ok(ExitCode::SUCCESS) };
     let kept = interrupt::commit(folder)?;
     if !is_interrupted {
