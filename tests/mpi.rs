@@ -285,14 +285,21 @@ fn ranks_with_different_programs_are_refused() {
 }
 
 /// What keeps a run from being looked at as a whole: each rank lays out a part of the body.
-const PARTED: [&str; 5] = ["--no-report", "--figures", "none", "--set", "record.probes=[]"];
+const PARTED: [&str; 3] = ["--no-report", "--figures", "none"];
 
 #[test]
 #[ignore = "needs mpirun"]
 fn a_run_in_parts_writes_the_tables_of_a_run_alone() {
     let folder = temporary();
     let fine = ["--set", "body.shape={kind=\"grid\",columns=300,rows=40}", "--steps", "100"];
-    for (name, more) in [("tension", &fine[..]), ("tension-immediate", &[]), ("lattice-honeycomb", &[])] {
+    let when = "roles[2]={region={kind=\"all\"},role=\"ghost\",from=9,when={quantity=\"pe1\",above=0.3}}";
+    for (name, more) in [
+        ("tension", &fine[..]),
+        ("tension-immediate", &[]),
+        ("lattice-honeycomb", &[]),
+        ("fracture", &["--steps", "80"]),
+        ("tension", &["--set", when, "--steps", "60"]),
+    ] {
         let run = |out: &'static str| [&["run", name, "--out", out][..], &PARTED, more].concat();
         assert_ends_well(&flockform(&run("alone"), folder.path()), name);
         for (ranks, out) in [(2, "two"), (4, "four")] {
@@ -335,7 +342,7 @@ fn every_rank_writes_its_piece_of_a_frame() {
 }
 
 /// A long run in parts.
-const LONG_IN_PARTS: [&str; 16] = [
+const LONG_IN_PARTS: [&str; 18] = [
     "run",
     "tension",
     "--out",
@@ -351,7 +358,9 @@ const LONG_IN_PARTS: [&str; 16] = [
     "--figures",
     "none",
     "--set",
-    "record.probes=[]",
+    "record.probes=[1,700,1500,2400]",
+    "--set",
+    "cuts=[{from=[29.5,-1.0],to=[29.5,12.5]}]",
 ];
 
 #[test]

@@ -1,9 +1,10 @@
 //! Whether two plans, or two files, are the same.
 
 use super::plan::Plan;
-use crate::engine::setup::{Conduct, Setup};
+use crate::engine::setup::{Conduct, RoleChange, Setup};
 use crate::flock::action::ActionKind;
 use crate::flock::law::Weights;
+use crate::flock::motion::Motion;
 use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
 
@@ -71,11 +72,19 @@ fn digest_of(plan: &Plan, team: Option<&Team>) -> u64 {
         digest.text(&format!("{:?} {:?}", bonds.threshold, bonds.ghosts));
     }
     for change in changes {
-        let what = format!("{:?} {} {:?} {:?}", change.role, change.from, change.when, change.motion);
-        digest.text(&what);
-        let own = change.particles.iter().filter(|particle| owned.contains(particle));
+        let RoleChange { particles, role, from, when, motion, .. } = change;
+        let (rows, motion) = match motion {
+            Some(Motion::Table { displacements, steps }) => (&displacements[..], format!("table {steps}")),
+            motion => (&[][..], format!("{motion:?}")),
+        };
+        digest.text(&format!("{role:?} {from} {when:?} {motion}"));
+        let is_own = |which: &usize| owned.contains(&particles[*which]);
+        let own = (0..particles.len()).filter(is_own);
         each(&mut digest, &|digest| {
-            own.clone().for_each(|&particle| digest.bytes(&((first + particle) as u64).to_le_bytes()));
+            for which in own.clone() {
+                digest.bytes(&((first + particles[which]) as u64).to_le_bytes());
+                digest.numbers(rows.get(which).map_or(&[][..], |row| &row[..]));
+            }
         });
     }
     for action in actions {

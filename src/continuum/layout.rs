@@ -311,7 +311,7 @@ impl Layout {
     pub fn pick(&self, scene: &Scene, key: &str, region: &SceneRegion) -> Result<Vec<usize>, SceneError> {
         let key = format!("{key}.region");
         check_ids(scene, &key, region, &self.body)?;
-        let particles = match (region, &self.outline) {
+        let mut particles = match (region, &self.outline) {
             (SceneRegion::Outline(selection), Some(outline)) => {
                 check_pieces(scene, &key, region, outline)?;
                 self.pick_along(selection, outline)
@@ -323,6 +323,10 @@ impl Layout {
             (SceneRegion::Known(region), _) => region.pick(&self.body, &self.neighbours),
             (SceneRegion::Outermost(side), _) => self.outermost(*side),
         };
+        // Those that are there for others to have neighbours lack some of their own.
+        if let Some(part) = &self.body.part {
+            particles.retain(|i| part.exact.contains(i));
+        }
         // Of a part it is nothing wrong if others have them.
         if particles.is_empty() && self.body.part.is_none() {
             return Err(self.holds_none(scene, &key));

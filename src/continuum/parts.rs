@@ -12,11 +12,10 @@ use std::ops::Range;
 use super::layout::{Layout, refuse_body};
 use crate::flock::body::{Body, BodyError, Census, Extent, Outlay, Part, empty};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
-use crate::flock::role::Role;
 use crate::flock::rules::Mean;
 use crate::geometry::disjoint_sets::DisjointSets;
 use crate::ranks::Team;
-use crate::scene::{BodySource, LeaderMotion, RoleEntry, Scene, SceneError, SceneRegion, Weights};
+use crate::scene::{BodySource, LeaderMotion, RoleEntry, Scene, SceneError, Weights};
 use crate::sweep::Order;
 use crate::sweep::caches::Caches;
 use crate::sweep::domain::{Share, cuts, steps_of};
@@ -25,7 +24,7 @@ use crate::sweep::rows::usual_band;
 /// The key for which a scene has to be laid out as a whole, on every rank; `None` where each can lay out its part.
 pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
     let weights = matches!(scene.weights, Some(Weights::Solved | Weights::Gradient { .. }));
-    let keys: [(bool, &str); 13] = [
+    let keys: [(bool, &str); 11] = [
         (!matches!(scene.body, BodySource::Cut(_)), "body.shape"),
         (scene.is_fitted, "body.outline"),
         (matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. }), "neighbours.kind"),
@@ -36,20 +35,11 @@ pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
         (scene.equilibrium.is_some(), "equilibrium"),
         (scene.load_steps.is_some(), "load_steps"),
         (!scene.loads.is_empty(), "loads"),
-        (scene.fracture.is_some(), "fracture"),
-        (!scene.cuts.is_empty(), "cuts"),
-        (!scene.actions.is_empty(), "actions"),
+        (scene.actions.iter().any(|action| !action.is_cut()), "actions"),
     ];
     let of_role = |(k, entry): (usize, &RoleEntry)| {
-        let RoleEntry { region, role, axis, when, motion, .. } = entry;
-        let is_simple = matches!(motion, None | Some(LeaderMotion::Program(_)));
-        let keys = [
-            (matches!(region, SceneRegion::Outline(_)), "region"),
-            (*role == Role::Ghost, "role"),
-            (axis.is_some(), "axis"),
-            (when.is_some(), "when"),
-            (!is_simple, "motion"),
-        ];
+        let is_led_by_truth = matches!(entry.motion, Some(LeaderMotion::Reference { .. }));
+        let keys = [(entry.axis.is_some(), "axis"), (is_led_by_truth, "motion")];
         let found = keys.into_iter().find(|(is, _)| *is);
         found.map(|(_, key)| format!("roles[{k}].{key}"))
     };
@@ -275,20 +265,20 @@ pub fn require_connected(body: &Body, neighbours: &Neighbours, team: &Team) -> R
     let end = owned.clone().map(sees).max().map_or(owned.end, |last| (last + 1).clamp(owned.end, exact.end));
     let beyond = (owned.end..end).filter(|&i| !body.is_frame[i]);
     let labelled: Vec<u64> = beyond.flat_map(|i| [(first + i) as u64, rank, u64::from(labels[i])]).collect();
-    let all = gather_all(team, &labelled);
+    let all = team.gather_all(&labelled);
     let here = |id: u64| (id as usize).checked_sub(*first).filter(|i| owned.contains(i));
     let pairs: BTreeSet<[u64; 4]> = all
         .chunks_exact(3)
         .filter_map(|of| Some([of[1], of[2], rank, u64::from(labels[here(of[0])?])]))
         .collect();
-    let pairs = gather_all(team, &pairs.into_iter().flatten().collect::<Vec<_>>());
+    let pairs = team.gather_all(&pairs.into_iter().flatten().collect::<Vec<_>>());
     // The first particle of each piece of this part.
     let mut pieces: BTreeMap<u32, u64> = BTreeMap::new();
     for i in owned.clone().filter(|&i| !body.is_frame[i]) {
         pieces.entry(labels[i]).or_insert((first + i) as u64);
     }
     let own: Vec<u64> = pieces.into_iter().flat_map(|(label, id)| [rank, u64::from(label), id]).collect();
-    let pieces = gather_all(team, &own);
+    let pieces = team.gather_all(&own);
     let numbers: BTreeMap<[u64; 2], u32> = {
         let nodes = pieces.chunks_exact(3).map(|of| [of[0], of[1]]);
         let ends = pairs.chunks_exact(2).map(|of| [of[0], of[1]]);
@@ -314,10 +304,4 @@ pub fn require_connected(body: &Body, neighbours: &Neighbours, team: &Team) -> R
         }
         _ => Ok(()),
     }
-}
-
-fn gather_all(team: &Team, own: &[u64]) -> Vec<u64> {
-    let counts: Vec<usize> =
-        team.each([own.len() as u64]).into_iter().map(|[count]| count as usize).collect();
-    team.gather(own, &counts)
 }

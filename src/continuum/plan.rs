@@ -9,9 +9,10 @@ use super::parts::{Parting, agreed, require_connected};
 use super::{places, weights};
 use crate::engine::probes::ProbeSeries;
 use crate::engine::setup::{Conduct, RoleChange, Setup, of_first_roles};
+use crate::engine::shared::of_all_parts;
 use crate::flock::action::{Action, ActionKind};
 use crate::flock::body::{Body, MOST_ENTRIES};
-use crate::flock::fracture::{Bonds, Ghosts};
+use crate::flock::fracture::{Bonds, Break, Ghosts};
 use crate::flock::law::{Flock, MatrixWeights, Weights};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::role::Role;
@@ -67,7 +68,9 @@ impl Plan {
         reference: Option<ReferenceMotion<'_>>,
     ) -> Result<Self, SceneError> {
         let changes = layout.role_changes(scene, reference)?;
-        Self::of_roles(scene, layout, changes)
+        let mut plan = Self::of_roles(scene, layout, changes)?;
+        make_cuts(&mut plan.setup, scene, |_, _, found| found);
+        Ok(plan)
     }
 
     /// The part of this rank, planned by all ranks together; for scenes that [`laid_out_whole_for`](super::parts::laid_out_whole_for) has nothing against.
@@ -87,6 +90,13 @@ impl Plan {
             }
         }
         let mut plan = agreed(scene, team, Self::of_roles(scene, layout, changes))?;
+        if plan.setup.flock.bonds.is_some() && u32::try_from(plan.setup.body.total()).is_err() {
+            let message = "broken bonds are known by particles up to number 4,294,967,295";
+            return Err(scene.refuse("body.shape", message, "use a wider spacing or a smaller shape"));
+        }
+        make_cuts(&mut plan.setup, scene, |body, neighbours, found| {
+            of_all_parts(team, body, neighbours, found)
+        });
         plan.agree_on_rest(team);
         Ok(plan)
     }
@@ -141,7 +151,6 @@ impl Plan {
         if setup.body.part.is_some() && !probes.is_empty() {
             setup.probes = Some(probes.iter().map(|&index| ProbeSeries::new(index)).collect());
         }
-        make_cuts(&mut setup, scene);
         take_first_roles(&mut setup);
         Ok(Self { setup, stop: scene.stop, diagonal, probes, outline, resultants })
     }
@@ -243,11 +252,13 @@ fn other_layout(scene: &Scene, changed: &Scene, layout: &Layout) -> Result<Optio
 /// Why keys do not change on the way.
 const OTHER_BODY: &str = "the body would have other particles or neighbours";
 
-fn make_cuts(setup: &mut Setup, scene: &Scene) {
-    if let Some(bonds) = &mut setup.flock.bonds {
-        for &ends in &scene.cuts {
-            bonds.cut(ends, &setup.flock.neighbours, &setup.body.reference, &mut setup.cuts);
-        }
+/// Makes the scene's cuts one after the other; `all` makes of the bonds that one breaks here those of the whole body.
+fn make_cuts(setup: &mut Setup, scene: &Scene, all: impl Fn(&Body, &Neighbours, Vec<Break>) -> Vec<Break>) {
+    let Setup { body, flock: Flock { bonds: Some(bonds), neighbours, .. }, cuts, .. } = setup else { return };
+    for &ends in &scene.cuts {
+        let mut found = Vec::new();
+        bonds.cut(ends, neighbours, &body.reference, &mut found);
+        cuts.extend(all(body, neighbours, found));
     }
 }
 
@@ -383,7 +394,9 @@ fn flock(
     let bonds = needs_bonds.then(|| {
         let (threshold, ghosts) =
             scene.fracture.map_or((None, Ghosts::Lattice), |fracture| (fracture.threshold, fracture.ghosts));
-        Bonds::new(threshold, ghosts, &neighbours)
+        let mut bonds = Bonds::new(threshold, ghosts, &neighbours);
+        bonds.owned = body.owned();
+        bonds
     });
     let mut flock = Flock {
         rule: Rule { mean: scene.mean, poisson, feedback: scene.feedback },

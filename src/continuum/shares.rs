@@ -84,11 +84,13 @@ impl PartShares {
         let parting = Parting::alone(scene, ranks)?;
         let rank = parting.largest();
         let largest = Plan::of_part_alone(scene, &parting, rank)?;
-        let Setup { body, flock, update, roles, probes, .. } = &largest.setup;
+        let Setup { body, flock, update, roles, probes, changes, .. } = &largest.setup;
         let part = body.part.as_ref().map(Part::held);
         let share = Share { rank, ranks, part, ..Share::whole() };
         let mut sweep = Sweep::compile_share(*update, flock, roles, share);
-        let takes_several = sweep.takes_several(body.frame.as_ref());
+        // Bonds that are broken may be those of other parts.
+        let looks = flock.bonds.is_some() || looks_at_every_step(false, flock, changes);
+        let takes_several = !looks && sweep.takes_several(body.frame.as_ref());
         let (steps, halo) = sweep
             .domain_mut()
             .map_or((0, 0), |domain| domain.needs(takes_several).most(usize::from(probes.is_some())));

@@ -67,6 +67,7 @@ impl Engine {
                 let known = self.breaks.len();
                 let places = (&*self.body.reference, &self.present);
                 bonds.cut_present(at, *cut, &flock.neighbours, places, &self.roles, &mut self.breaks);
+                self.share_breaks(known);
                 self.set_torn_aside(known);
             }
         }

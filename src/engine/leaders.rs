@@ -32,12 +32,8 @@ impl Engine {
     pub(super) fn take_roles(&mut self) {
         let mut changed = false;
         for change in 0..self.changes.len() {
-            let taking = self.taking(change);
             // The ranks that have no particle of it compile their sweeps with the others.
-            let comes_to_others = self.parted().is_some() && self.changes[change].from == self.step;
-            if taking.is_empty() && !(comes_to_others && self.step > 1) {
-                continue;
-            }
+            let Some(taking) = self.taking(change) else { continue };
             for &which in &taking {
                 self.roles[self.changes[change].particles[which]] = self.changes[change].role;
             }
@@ -51,17 +47,29 @@ impl Engine {
         }
     }
 
-    /// Which of a change's particles take its role at this step.
-    fn taking(&self, change: usize) -> Vec<usize> {
+    /// Which of a change's particles take its role at this step; `None` if none of the whole body do.
+    fn taking(&self, change: usize) -> Option<Vec<usize>> {
         let RoleChange { particles, role, from, when, .. } = &self.changes[change];
         match when {
             // Those from the start hold already.
-            None if *from == self.step && *from > 1 => (0..particles.len()).collect(),
-            Some(condition) if *from <= self.step => (0..particles.len())
-                .filter(|&which| self.roles[particles[which]] != *role)
-                .filter(|&which| condition.holds(self.quantity(condition.quantity, particles[which])))
-                .collect(),
-            _ => Vec::new(),
+            None => (*from == self.step && *from > 1).then(|| (0..particles.len()).collect()),
+            Some(condition) if *from <= self.step => {
+                let owned = self.body.owned();
+                let meets = |&which: &usize| {
+                    let particle = particles[which];
+                    owned.contains(&particle)
+                        && self.roles[particle] != *role
+                        && condition.holds(self.quantity(condition.quantity, particle))
+                };
+                let own: Vec<usize> = (0..particles.len()).filter(meets).collect();
+                let Some(team) = self.parted() else { return Some(own).filter(|own| !own.is_empty()) };
+                let first = self.body.first();
+                let own: Vec<u64> = own.into_iter().map(|which| (first + particles[which]) as u64).collect();
+                let all = team.gather_all(&own);
+                let here = |&index: &u64| particles.binary_search(&(index as usize).checked_sub(first)?).ok();
+                (!all.is_empty()).then(|| all.iter().filter_map(here).collect())
+            }
+            Some(_) => None,
         }
     }
 

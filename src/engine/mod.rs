@@ -386,19 +386,27 @@ impl Engine {
     fn after_role_change(&mut self) {
         // A particle that is no longer moved must agree in both buffers.
         self.previous.clone_from(&self.present);
-        if let Some(bonds) = &mut self.flock.bonds {
-            let places = (&*self.body.reference, &self.present);
-            bonds.release_ghosts(self.step, &self.flock.neighbours, places, &self.roles, &mut self.breaks);
-        }
+        self.release_ghosts();
         if let Some(present) = &mut self.present_neighbours {
             present.members = self.roles.iter().map(|role| role.is_body()).collect();
         }
         self.compile_sweep();
     }
 
+    /// Of a part only once the ranks share the body.
+    fn release_ghosts(&mut self) {
+        let is_ready = self.body.part.is_none() || self.team.is_some();
+        let Some(bonds) = self.flock.bonds.as_mut().filter(|_| is_ready) else { return };
+        let known = self.breaks.len();
+        let places = (&*self.body.reference, &self.present);
+        bonds.release_ghosts(self.step, &self.flock.neighbours, places, &self.roles, &mut self.breaks);
+        self.share_breaks(known);
+    }
+
     fn compile_sweep(&mut self) {
         self.activity.forget();
         self.flock.renew_rest_of_torn();
+        self.agree_on_rest();
         let share = self.team.as_ref().map_or_else(Share::whole, |(_, share)| *share);
         self.sweep = if self.present_neighbours.is_some() {
             let mut sweep = Sweep::uncompiled(self.update, &self.flock, &self.roles);
@@ -412,10 +420,11 @@ impl Engine {
     }
 
     fn break_bonds(&mut self) {
-        let Some(bonds) = &mut self.flock.bonds else { return };
+        let Some(bonds) = self.flock.bonds.as_mut().filter(|bonds| bonds.threshold.is_some()) else { return };
         let known = self.breaks.len();
         let places = (&*self.body.reference, &self.present);
         bonds.break_stretched(self.step, &self.flock.neighbours, places, &self.roles, &mut self.breaks);
+        self.share_breaks(known);
         self.set_torn_aside(known);
     }
 
@@ -424,9 +433,11 @@ impl Engine {
         if self.breaks.len() > known {
             tracing::debug!("step {}: {} bonds break", self.step, self.breaks.len() - known);
             self.takes_several = false;
-            let torn = self.breaks[known..].iter().flat_map(|b| b.pair).map(|j| j as usize);
+            let here = |index: u32| self.body.exact_particle(index as usize);
+            let torn = self.breaks[known..].iter().flat_map(|b| b.pair).filter_map(here);
             self.flock.renew_rest(torn.clone());
             self.sweep.set_aside(torn, &self.flock);
+            self.agree_on_rest();
         }
     }
 

@@ -16,7 +16,9 @@ use std::ops::{ControlFlow, Range};
 use super::Engine;
 use super::movement;
 use super::observer::Observer;
-use crate::flock::body::Part;
+use crate::flock::body::{Body, Part};
+use crate::flock::fracture::{Bonds, Break};
+use crate::flock::neighbourhood::Neighbours;
 use crate::flock::vectors::{Vectors, distance};
 use crate::ranks::Team;
 use crate::sweep::caches::Caches;
@@ -34,7 +36,7 @@ impl Engine {
     /// # Errors
     /// A sequential sweep.
     pub fn join(&mut self, team: Team) -> Result<(), NotShared> {
-        if team.count() == 1 {
+        if team.count() == 1 && self.body.part.is_none() {
             return Ok(());
         }
         if self.update.order == Order::Sequential {
@@ -47,6 +49,7 @@ impl Engine {
             let _ = self.activity.take_counts();
         }
         self.team = Some((team, share));
+        self.release_ghosts();
         self.compile_sweep();
         Ok(())
     }
@@ -88,6 +91,22 @@ impl Engine {
         if let Some(frame) = &self.body.frame {
             frame.follow(&self.flock.reference, &self.present, &mut self.previous);
         }
+    }
+
+    /// Puts the bonds that break in the whole body in the place of those that break here, which come after `known` others.
+    pub(super) fn share_breaks(&mut self, known: usize) {
+        let Some((team, _)) = self.team.as_ref().filter(|_| self.body.part.is_some()) else { return };
+        let found = self.breaks.split_off(known);
+        self.breaks.extend(of_all_parts(team, &self.body, &self.flock.neighbours, found));
+    }
+
+    /// Keeps rest offsets if a particle of any rank needs one.
+    pub(super) fn agree_on_rest(&mut self) {
+        let (Some(team), Some(_)) = (self.parted(), &self.flock.bonds) else { return };
+        let is_needed = |rest: &Vectors| self.body.owned().any(|i| rest.get(i) != [0.0; 2]);
+        let is_needed = team.any(self.flock.rest.as_ref().is_some_and(is_needed));
+        let rest = self.flock.rest.take();
+        self.flock.rest = is_needed.then(|| rest.unwrap_or_else(|| Vectors::zeros(self.body.count())));
     }
 
     /// Learns what the other ranks move and need; to be called by all of them when the sweep is compiled.
@@ -178,6 +197,26 @@ pub(super) fn take_steps(
 
 fn both(points: &mut Vectors) -> [&mut [f64]; 2] {
     [&mut points.x, &mut points.y]
+}
+
+/// The bonds that break in the whole body, in its order, of those that each rank has found among its own particles, by the numbers
+/// that these have here.
+pub fn of_all_parts(team: &Team, body: &Body, neighbours: &Neighbours, found: Vec<Break>) -> Vec<Break> {
+    let (first, owned) = (body.first(), body.owned());
+    // Of a bond between two parts, which both find, the one speaks that records it.
+    let is_own =
+        |one: &Break| owned.contains(&Bonds::recorded_from(one.pair.map(|i| i as usize), neighbours));
+    let words_of = |Break { step, pair, place, length }: Break| {
+        let [a, b] = pair.map(|particle| (first + particle as usize) as u64);
+        [step as u64, a, b, place[0].to_bits(), place[1].to_bits(), length.to_bits()]
+    };
+    let own: Vec<u64> = found.into_iter().filter(is_own).flat_map(words_of).collect();
+    let words = team.gather_all(&own);
+    let all = words.chunks_exact(6).map(|of| {
+        let [x, y, length] = [of[3], of[4], of[5]].map(f64::from_bits);
+        Break { step: of[0] as usize, pair: [of[1] as u32, of[2] as u32], place: [x, y], length }
+    });
+    all.collect()
 }
 
 /// Receives what is needed of others before so many steps.

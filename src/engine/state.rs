@@ -4,6 +4,7 @@
 //! state: they are planned again, and the digest of the plan shows whether they came out the same.
 
 use std::borrow::Cow;
+use std::collections::HashSet;
 
 use serde::{Deserialize, Serialize};
 
@@ -12,6 +13,7 @@ use super::leaders::Led;
 use super::serde_impls;
 use super::setup::Setup;
 use crate::flock::fracture::Break;
+use crate::flock::neighbourhood::Neighbours;
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
 use crate::sweep::Activity;
@@ -78,7 +80,9 @@ impl<'a> EngineState<'a> {
             guided: Cow::Borrowed(&engine.guided),
             breaks: Cow::Borrowed(&engine.breaks),
             activity: engine.activity.clone(),
-            broken: flock.bonds.as_ref().map(|bonds| (0..bytes).map(|byte| packed(byte, bonds)).collect()),
+            // Those of a part are known by its broken pairs, which are those of the whole body.
+            broken: (flock.bonds.as_ref().filter(|_| engine.body.part.is_none()))
+                .map(|bonds| (0..bytes).map(|byte| packed(byte, bonds)).collect()),
         }
     }
 
@@ -141,6 +145,7 @@ impl<'a> EngineState<'a> {
             return Err(WrongState { what: "particles", found: known, planned: exact.len() });
         }
         leaders.sort_unstable_by_key(|led: &Led| led.particle);
+        let breaks = pieces.first().map_or_else(Vec::new, |(_, state)| state.breaks.to_vec());
         let mut activity = pieces.first().map_or_else(Activity::default, |(_, state)| state.activity.clone());
         activity.forget();
         Ok(EngineState {
@@ -150,9 +155,9 @@ impl<'a> EngineState<'a> {
             roles: Cow::Owned(roles),
             leaders,
             guided: Cow::Owned(Vec::new()),
-            breaks: Cow::Owned(Vec::new()),
+            broken: setup.flock.bonds.as_ref().map(|_| bits_of(&breaks, first, &setup.flock.neighbours)),
+            breaks: Cow::Owned(breaks),
             activity,
-            broken: None,
         })
     }
 
@@ -211,10 +216,23 @@ impl<'a> EngineState<'a> {
             require_below("guided particles", *particle, count)?;
         }
         for particle in self.breaks.iter().flat_map(|one| one.pair) {
-            require_below("particles of broken bonds", particle as usize, count)?;
+            require_below("particles of broken bonds", particle as usize, engine.body.total())?;
         }
         Ok(())
     }
+}
+
+/// Whether each bond is of one of these pairs, eight to a byte.
+fn bits_of(breaks: &[Break], first: usize, neighbours: &Neighbours) -> Vec<u8> {
+    let pairs: HashSet<[u32; 2]> = breaks.iter().map(|one| one.pair).collect();
+    let mut bits = vec![0; neighbours.index.len().div_ceil(8)];
+    for j in (0..neighbours.count()).filter(|_| !pairs.is_empty()) {
+        for bond in neighbours.bonds(j) {
+            let [a, b] = [j, neighbours.index[bond] as usize].map(|i| (first + i) as u32);
+            bits[bond / 8] |= u8::from(pairs.contains(&[a.min(b), a.max(b)])) << (bond % 8);
+        }
+    }
+    bits
 }
 
 impl Engine {

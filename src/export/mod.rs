@@ -217,6 +217,13 @@ pub fn write_all_of_parts(
         }
         _ => Ok(()),
     });
+    let breaks = outcome.engine.breaks();
+    let written = written.and_then(|()| match folder {
+        Some(folder) if !breaks.is_empty() => {
+            csv::write_breaks(folder, outcome.engine.body(), breaks).map(drop)
+        }
+        _ => Ok(()),
+    });
     timings.output += start.elapsed();
     // Sums over all parts: the others wait for this one even if it could not write.
     let summary = Summary::new(scene, outcome, None, timings);

@@ -354,6 +354,12 @@ impl Body {
         }
     }
 
+    /// The particle with this index in the whole body, if it is here as in that.
+    pub fn exact_particle(&self, index: usize) -> Option<usize> {
+        let exact = self.part.as_ref().map_or(0..self.count(), |part| part.exact.clone());
+        index.checked_sub(self.first()).filter(|particle| exact.contains(particle))
+    }
+
     /// Index in the whole body of the first particle that stands here.
     pub fn first(&self) -> usize {
         self.part.as_ref().map_or(0, |part| part.first)
@@ -369,9 +375,9 @@ impl Body {
         self.part.as_ref().map_or(0..self.count(), |part| part.owned.clone())
     }
 
-    /// The ids of the two ends of a bond, the lower first.
+    /// The ids of the two ends of a bond, given by their indices in the whole body, the lower first.
     pub fn ids(&self, pair: [u32; 2]) -> [usize; 2] {
-        let [a, b] = pair.map(|particle| self.id(particle as usize));
+        let [a, b] = pair.map(|index| self.id_of(index as usize));
         [a.min(b), a.max(b)]
     }
 

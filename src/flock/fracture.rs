@@ -5,6 +5,8 @@
 pub(crate) mod tests;
 mod watch;
 
+use std::ops::Range;
+
 use super::neighbourhood::Neighbours;
 use super::role::Role;
 use super::vectors::{Vectors, distance};
@@ -54,7 +56,7 @@ pub enum Ghosts {
 pub struct Break {
     /// Step at which it broke; 0 for a bond cut before the first.
     pub step: usize,
-    /// Indices of the two particles, the lower first.
+    /// Indices of the two particles in the whole body, the lower first.
     pub pair: [u32; 2],
     /// Middle of the bond in the reference configuration \[length\].
     pub place: [f64; 2],
@@ -69,6 +71,9 @@ pub struct Bonds {
     pub threshold: Option<Threshold>,
     /// The substitute for neighbours that are lost.
     pub ghosts: Ghosts,
+    /// A bond breaks here if it has an end among these particles: in a part of a body those that belong to it. Nothing here looks
+    /// at the others.
+    pub owned: Range<usize>,
     broken: Vec<bool>,
     any_broken: bool,
     /// Whether every particle is a neighbour of each of its neighbours.
@@ -94,6 +99,7 @@ impl Bonds {
         Self {
             threshold,
             ghosts,
+            owned: 0..neighbours.count(),
             broken: vec![false; neighbours.index.len()],
             any_broken: false,
             is_mutual: (0..neighbours.count()).all(seen_by),
@@ -202,6 +208,11 @@ impl Bonds {
         });
     }
 
+    /// The end of a pair from which a broken bond is recorded: the lower one, if that sees the other.
+    pub fn recorded_from([low, high]: [usize; 2], neighbours: &Neighbours) -> usize {
+        if bond_to(low, high, neighbours).is_some() { low } else { high }
+    }
+
     fn break_where(
         &mut self,
         step: usize,
@@ -226,10 +237,11 @@ impl Bonds {
         for j in particles {
             for bond in neighbours.bonds(j) {
                 let k = neighbours.index[bond] as usize;
-                if self.broken[bond] || !breaks_now(j, k) {
+                let is_found_here = self.owned.contains(&j) || self.owned.contains(&k);
+                if self.broken[bond] || !is_found_here || !breaks_now(j, k) {
                     continue;
                 }
-                let back = neighbours.bonds(k).find(|&bond| neighbours.index[bond] as usize == j);
+                let back = bond_to(k, j, neighbours);
                 self.broken[bond] = true;
                 self.any_broken = true;
                 if let Some(back) = back.filter(|_| self.is_mutual) {
@@ -293,4 +305,9 @@ impl Bonds {
             }
         }
     }
+}
+
+/// Where `j` has its bond to `k`, if it sees it.
+fn bond_to(j: usize, k: usize, neighbours: &Neighbours) -> Option<usize> {
+    neighbours.bonds(j).find(|&bond| neighbours.index[bond] as usize == k)
 }

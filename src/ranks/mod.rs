@@ -98,6 +98,13 @@ impl Team {
         self.exchange().gather(own, counts)
     }
 
+    /// The words of all ranks, one after the other, where each has as many as it has; an exchange less where there are none.
+    pub fn gather_all(&self, own: &[u64]) -> Vec<u64> {
+        let counts: Vec<usize> =
+            self.each([own.len() as u64]).into_iter().map(|[count]| count as usize).collect();
+        if counts.iter().all(|&count| count == 0) { Vec::new() } else { self.gather(own, &counts) }
+    }
+
     /// As many words of each rank, shape \[ranks\]\[N\].
     pub fn each<const N: usize>(&self, own: [u64; N]) -> Vec<[u64; N]> {
         let all = self.gather(&own, &vec![N; self.count]);
