@@ -323,10 +323,8 @@ impl Layout {
             (SceneRegion::Known(region), _) => region.pick(&self.body, &self.neighbours),
             (SceneRegion::Outermost(side), _) => self.outermost(*side),
         };
-        // Those that are there for others to have neighbours lack some of their own.
-        if let Some(part) = &self.body.part {
-            particles.retain(|i| part.exact.contains(i));
-        }
+        let exact = self.body.exact();
+        particles.retain(|i| exact.contains(i));
         // Of a part it is nothing wrong if others have them.
         if particles.is_empty() && self.body.part.is_none() {
             return Err(self.holds_none(scene, &key));

@@ -185,18 +185,19 @@ pub(super) fn take_steps(
         let (sent, sizes) = messages(&halo, &[&*present]);
         let received = team.swap_while(&sent, &sizes, &mut || {
             if beyond == 0 && steps.has_inside() {
-                steps.go_on(&mut under_way, Stage::Inside, both(present), both(previous));
+                steps.go_on(
+                    &mut under_way,
+                    Stage::Inside,
+                    present.components_mut(),
+                    previous.components_mut(),
+                );
                 stage = Stage::Rim;
             }
         });
         put_all(&halo, &received, &mut [&mut *present]);
     }
-    steps.go_on(&mut under_way, stage, both(present), both(previous));
+    steps.go_on(&mut under_way, stage, present.components_mut(), previous.components_mut());
     steps.end(under_way, activity)
-}
-
-fn both(points: &mut Vectors) -> [&mut [f64]; 2] {
-    [&mut points.x, &mut points.y]
 }
 
 /// The bonds that break in the whole body, in its order, of those that each rank has found among its own particles, by the numbers

@@ -122,8 +122,7 @@ impl<'a> EngineState<'a> {
         setup: &Setup,
     ) -> Result<EngineState<'static>, WrongState> {
         let body = &setup.body;
-        let first = body.first();
-        let exact = body.part.as_ref().map_or(0..body.count(), |part| part.exact.clone());
+        let (first, exact) = (body.first(), body.exact());
         // Those that are there for the others to have neighbours are never looked at.
         let (mut present, mut roles) = (Vectors::clone(&body.reference), setup.roles.clone());
         let (mut previous, mut leaders, mut known) = (present.clone(), Vec::new(), 0);

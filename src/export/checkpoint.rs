@@ -317,9 +317,8 @@ impl Checkpoint<'static> {
             return Ok(());
         }
         let Parts { first, others } = std::mem::take(&mut self.parts);
-        let part = setup.body.part.as_ref();
-        let needed = part
-            .map_or(0..setup.body.count(), |part| part.first + part.exact.start..part.first + part.exact.end);
+        let (before, exact) = (setup.body.first(), setup.body.exact());
+        let needed = before + exact.start..before + exact.end;
         let mut pieces = vec![(first, self.engine.clone())];
         for OtherPart { file, first, count } in others {
             if first >= needed.end || first + count <= needed.start {

@@ -154,12 +154,7 @@ pub fn write_all(
     let mut written = vec![csv::write_final(folder, engine, of_particles)?];
     // Figures take memory of their own.
     drop(stresses);
-    if !results.probes.is_empty() {
-        written.push(csv::write_probes(folder, engine.body(), results.probes)?);
-    }
-    if !engine.breaks().is_empty() {
-        written.push(csv::write_breaks(folder, engine.body(), engine.breaks())?);
-    }
+    written.extend(write_histories(folder, engine, results.probes)?);
     if let Some(solved) = &results.outcome.solved {
         written.push(csv::write_residuals(folder, &solved.residuals)?);
     }
@@ -174,6 +169,19 @@ pub fn write_all(
     let summary = Summary::new(results.scene, results.outcome, measured, timings);
     written.push(summary.write(folder)?);
     Ok((written, summary))
+}
+
+/// The tables of probes and of broken bonds, where there are any.
+fn write_histories(
+    folder: &OutputFolder,
+    engine: &Engine,
+    probes: &[ProbeSeries],
+) -> Result<Vec<PathBuf>, ExportError> {
+    let (body, breaks) = (engine.body(), engine.breaks());
+    let probes = (!probes.is_empty()).then(|| csv::write_probes(folder, body, probes));
+    let probes = probes.transpose()?;
+    let breaks = (!breaks.is_empty()).then(|| csv::write_breaks(folder, body, breaks));
+    Ok(probes.into_iter().chain(breaks.transpose()?).collect())
 }
 
 /// The histories of all probed particles, whose indices in the whole body are given, in their order; each rank has those of its
@@ -212,17 +220,8 @@ pub fn write_all_of_parts(
     let probes = probes_of_parts(&outcome.engine, probes, team);
     let written = csv::write_final_of_parts(folder, &outcome.engine, team);
     let written = written.and_then(|()| match folder {
-        Some(folder) if !probes.is_empty() => {
-            csv::write_probes(folder, outcome.engine.body(), &probes).map(drop)
-        }
-        _ => Ok(()),
-    });
-    let breaks = outcome.engine.breaks();
-    let written = written.and_then(|()| match folder {
-        Some(folder) if !breaks.is_empty() => {
-            csv::write_breaks(folder, outcome.engine.body(), breaks).map(drop)
-        }
-        _ => Ok(()),
+        Some(folder) => write_histories(folder, &outcome.engine, &probes).map(drop),
+        None => Ok(()),
     });
     timings.output += start.elapsed();
     // Sums over all parts: the others wait for this one even if it could not write.

@@ -356,8 +356,7 @@ impl Body {
 
     /// The particle with this index in the whole body, if it is here as in that.
     pub fn exact_particle(&self, index: usize) -> Option<usize> {
-        let exact = self.part.as_ref().map_or(0..self.count(), |part| part.exact.clone());
-        index.checked_sub(self.first()).filter(|particle| exact.contains(particle))
+        index.checked_sub(self.first()).filter(|particle| self.exact().contains(particle))
     }
 
     /// Index in the whole body of the first particle that stands here.
@@ -373,6 +372,12 @@ impl Body {
     /// The particles that belong to this part of the body; all of a whole one.
     pub fn owned(&self) -> Range<usize> {
         self.part.as_ref().map_or(0..self.count(), |part| part.owned.clone())
+    }
+
+    /// The particles that see here what they see in the whole body: all but those that are there for others to have
+    /// neighbours.
+    pub fn exact(&self) -> Range<usize> {
+        self.part.as_ref().map_or(0..self.count(), |part| part.exact.clone())
     }
 
     /// The ids of the two ends of a bond, given by their indices in the whole body, the lower first.

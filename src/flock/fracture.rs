@@ -251,12 +251,12 @@ impl Bonds {
                 {
                     watch.forget([j, k]);
                 }
-                // Seen from both ends where both list it, recorded from the lower one.
-                if j < k || back.is_none() {
+                let pair = [j.min(k), j.max(k)];
+                if Self::recorded_from(pair, neighbours) == j {
                     let (a, b) = (reference.get(j), reference.get(k));
                     breaks.push(Break {
                         step,
-                        pair: [j.min(k) as u32, j.max(k) as u32],
+                        pair: pair.map(|i| i as u32),
                         place: [(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0],
                         length: distance(present.get(j), present.get(k)),
                     });

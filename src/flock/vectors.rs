@@ -39,6 +39,16 @@ impl<T: Copy + Default> Vectors<T> {
         self.x.is_empty()
     }
 
+    /// The coordinates along each axis, shape \[2\]\[count\].
+    pub fn components(&self) -> [&[T]; 2] {
+        [&self.x, &self.y]
+    }
+
+    /// The same, to be overwritten.
+    pub fn components_mut(&mut self) -> [&mut [T]; 2] {
+        [&mut self.x, &mut self.y]
+    }
+
     /// Both coordinates of one vector.
     pub fn get(&self, index: usize) -> [T; 2] {
         [self.x[index], self.y[index]]

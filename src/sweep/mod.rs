@@ -262,7 +262,7 @@ impl Sweep {
         activity: &mut Activity,
     ) -> Vec<bool> {
         let steps = self.steps_to_take(flock, frame, (count, led, farther), 0);
-        let farther = steps.take(activity, [&mut present.x, &mut present.y], [&mut next.x, &mut next.y]);
+        let farther = steps.take(activity, present.components_mut(), next.components_mut());
         if count % 2 == 1 {
             std::mem::swap(present, next);
         }
@@ -278,8 +278,9 @@ impl Sweep {
         beyond: usize,
     ) -> Steps<'a, f64> {
         let rows = self.rows.as_ref().expect("a sweep that takes several steps has rows");
-        let [rest, force] = [&flock.rest, &flock.forces].map(|points| points.as_ref().map(both));
-        let frame = frame.map(|frame| LaggedFrame { frame, reference: both(&flock.reference) });
+        let [rest, force] =
+            [&flock.rest, &flock.forces].map(|points| points.as_ref().map(Vectors::components));
+        let frame = frame.map(|frame| LaggedFrame { frame, reference: flock.reference.components() });
         let (terms, threads) = (self.terms.of(flock), rayon::current_num_threads());
         let Range { start, end } = self.bands(rows);
         // A rank without bands has none around them.
@@ -331,8 +332,9 @@ impl Sweep {
         let terms = self.terms.of(flock);
         let work = |(bands, begin, next_x, next_y): (Range<usize>, usize, &mut [f64], &mut [f64])| {
             let mut components = [(0, next_x), (1, next_y)].map(|(axis, next)| {
-                let of = |points| coordinates(points, axis);
-                let (present, rest, force) = (of(present), rest.map(of), force.map(of));
+                let [rest, force] =
+                    [rest, force].map(|points| points.map(|points| points.components()[axis]));
+                let present = present.components()[axis];
                 Component { axis, seen_from: 0, present, rest, force, begin, next }
             });
             if self.torn.is_empty() {
@@ -359,14 +361,6 @@ impl Sweep {
         let here = seen.get(j);
         [0, 1].map(|k| here[k] + damping * (target[k] - here[k]))
     }
-}
-
-fn both(points: &Vectors) -> [&[f64]; 2] {
-    [&points.x, &points.y]
-}
-
-fn coordinates(points: &Vectors, axis: usize) -> &[f64] {
-    if axis == 0 { &points.x } else { &points.y }
 }
 
 /// Particles per piece of work in a body of so many: every thread gets several.

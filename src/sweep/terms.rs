@@ -121,7 +121,7 @@ impl Compiled {
 
     /// For the body that they were compiled for.
     pub fn of<'a>(&'a self, flock: &'a Flock) -> Terms<'a, f64> {
-        let reference = [&flock.reference.x[..], &flock.reference.y[..]];
+        let reference = flock.reference.components();
         let contraction = |poisson: crate::flock::rules::Poisson| {
             let along = poisson.axis as usize;
             Contraction { k: poisson.k, along, reference: reference[along], distance: &self.distance }

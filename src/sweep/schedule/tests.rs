@@ -81,14 +81,14 @@ impl Case {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         for &count in counts {
             let led = Led { particles: &self.led, places: &self.places(done + 1..=done + count) };
-            let rest = self.flock.rest.as_ref().map(|rest| [&rest.x[..], &rest.y[..]]);
+            let rest = self.flock.rest.as_ref().map(Vectors::components);
             let (rows, terms) = (sweep.rows.as_ref().expect("affine"), sweep.terms.of(&self.flock));
-            let force = self.flock.forces.as_ref().map(|force| [&force.x[..], &force.y[..]]);
+            let force = self.flock.forces.as_ref().map(Vectors::components);
             let frame = None;
             let owned = 0..rows.band_count();
             let steps = Steps { rows, owned, terms, rest, force, frame, led, count, farther: None, threads };
-            let even = [&mut present.x[..], &mut present.y[..]];
-            let odd = [&mut next.x[..], &mut next.y[..]];
+            let even = present.components_mut();
+            let odd = next.components_mut();
             pool.install(|| steps.take(&mut activity, even, odd));
             if count % 2 == 1 {
                 std::mem::swap(&mut present, &mut next);

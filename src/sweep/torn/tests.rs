@@ -19,7 +19,7 @@ fn compare_targets(
     let count = reference.len();
     let mut present = draws.points(reference, 0.7);
     (0..count).step_by(9).for_each(|j| present.x[j] = -0.0);
-    let rests = body.rest.as_ref().map(|rest| [&rest.x[..], &rest.y[..]]);
+    let rests = body.rest.as_ref().map(Vectors::components);
     let mut next = Vectors { x: vec![MARK; count], y: vec![MARK; count] };
     let middle = BANDS / 2 * count / BANDS;
     let (low, high) = (next.x.split_at_mut(middle), next.y.split_at_mut(middle));
