@@ -75,7 +75,9 @@ export function listenToKeys() {
   document.addEventListener("keydown", (event) => {
     const own = event.target.closest("input, select, textarea, button, summary, pre");
     const isRange = event.target.matches?.("#time, input[type=checkbox]");
-    if ((own && !isRange) || event.ctrlKey || event.metaKey || event.altKey) return;
+    // A space would choose what is chosen already.
+    const isIdle = event.key === " " && event.target.matches?.("input[type=radio]:checked");
+    if ((own && !isRange && !isIdle) || event.ctrlKey || event.metaKey || event.altKey) return;
     const shifts = { ArrowLeft: [60, 0], ArrowRight: [-60, 0], ArrowUp: [0, 60], ArrowDown: [0, -60] };
     const keys = {
       " ": () => shown.player.toggle(),
