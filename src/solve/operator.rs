@@ -8,6 +8,8 @@ mod columns;
 mod connected;
 mod kernel;
 mod matrix;
+mod packs;
+mod rows;
 #[cfg(test)]
 pub mod samples;
 #[cfg(test)]
@@ -18,6 +20,7 @@ use std::collections::HashMap;
 pub(crate) use columns::{Columns, Segment};
 pub(crate) use kernel::{RowCoefficients, Task, array, array_mut, pass, product};
 pub(crate) use matrix::{HELD, Matrix, leads_to_outlier};
+pub(crate) use rows::{RowRef, Rows};
 
 use crate::flock::block::{Block, transposed};
 use crate::flock::lattice::Site;

@@ -331,7 +331,7 @@ mod tests {
             x: (0..matrix.count()).map(|i| of(i, 2 * i)).collect(),
             y: (0..matrix.count()).map(|i| of(i, 2 * i + 1)).collect(),
         };
-        let stencils = RowCoefficients::<T>::new(&matrix.rows, 0.7);
+        let stencils = RowCoefficients::<T>::new(&matrix, 0.7);
         let mut out = Vectors::zeros(matrix.count());
         matrix.receive(&mut u);
         let sum = crate::solve::equilibrium::steps::apply(&matrix, &stencils, &u, &mut out);

@@ -20,7 +20,8 @@ const SAFETY: f64 = 1.02;
 
 pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
     let begin = Stopwatch::start();
-    let Prepared { matrix, stencils, right, size, .. } = prepared;
+    let Prepared { matrix, right, size, .. } = &*prepared;
+    let stencils = prepared.stencils();
     let Bounds { low, high } = lanczos::both(matrix, stencils, ESTIMATE);
     if low <= 0.0 {
         return Err(SolveError::NotPositive { solver: Solver::Chebyshev, iteration: 0 });

@@ -8,6 +8,7 @@ use super::history::History;
 use super::steps::{for_groups, for_own_groups};
 use super::system::Prepared;
 use super::{Found, Precision, Request, SolveError, Solver, steps};
+use crate::flock::block::Block;
 use crate::flock::vectors::Vectors;
 use crate::solve::field::{Real, VectorsMut, VectorsRef, dot};
 use crate::solve::operator::{Matrix, RowCoefficients};
@@ -29,11 +30,11 @@ pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found,
     match request.precision {
         Precision::F64 => {
             let mut jacobi =
-                BlockJacobi { matrix, stencils: &prepared.stencils, z: Vectors::zeros(right.len()) };
-            iterate(prepared, &prepared.stencils, right, &mut jacobi, request, Solver::ConjugateGradients)
+                BlockJacobi { matrix, stencils: prepared.stencils(), z: Vectors::zeros(right.len()) };
+            iterate(prepared, prepared.stencils(), right, &mut jacobi, request, Solver::ConjugateGradients)
         }
         Precision::F32 => {
-            let stencils = RowCoefficients::<f32>::new(&matrix.rows, single_scale(matrix));
+            let stencils = RowCoefficients::<f32>::new(matrix, single_scale(matrix));
             let mut jacobi = BlockJacobi { matrix, stencils: &stencils, z: Vectors::zeros(right.len()) };
             iterate_single(prepared, &stencils, right, &mut jacobi, request, Solver::ConjugateGradients)
         }
@@ -43,8 +44,8 @@ pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found,
 /// The inverse of the largest stiffness: in single precision the rows are scaled by it, so that neither
 /// pascals nor parts of them overflow.
 pub(super) fn single_scale(matrix: &Matrix) -> f64 {
-    let largest = |row: &crate::solve::operator::Row| row.diagonal[0][0].abs().max(row.diagonal[1][1].abs());
-    1.0 / matrix.rows.iter().map(largest).fold(f64::MIN_POSITIVE, f64::max)
+    let largest = |diagonal: &Block| diagonal[0][0].abs().max(diagonal[1][1].abs());
+    1.0 / matrix.rows.diagonals().iter().map(largest).fold(f64::MIN_POSITIVE, f64::max)
 }
 
 /// The whole iteration in single precision: right-hand side and rows scaled to about 1.

@@ -36,7 +36,7 @@ pub(super) fn solve(prepared: &mut Prepared, system: &System) -> Result<Found, S
     let displacement = sparse.displacements(&unknowns, prepared.matrix.count());
     let mut r = Vectors::zeros(prepared.matrix.count());
     let fields = (&displacement, &prepared.right);
-    let residual = steps::residual(&prepared.matrix, &prepared.stencils, fields, &mut r).sqrt();
+    let residual = steps::residual(&prepared.matrix, prepared.stencils(), fields, &mut r).sqrt();
     Ok(Found { displacement, residuals: vec![1.0, residual / prepared.size], set_up })
 }
 
@@ -60,14 +60,14 @@ impl Sparse {
         let mut sparse = Self { particles, starts: vec![0], rows: Vec::new(), values: Vec::new() };
         let mut order: Vec<(usize, [[f64; 2]; 2])> = Vec::new();
         for run in matrix.runs() {
-            let row = &matrix.rows[run.class as usize];
+            let row = matrix.rows.of(run.class);
             for i in run.start as usize..(run.start + run.len) as usize {
-                let others = matrix.distances(run)[1..].iter().zip(&row.entries);
+                let others = matrix.distances(run)[1..].iter().zip(row.entries);
                 let others = others.map(|(&distance, (_, block))| {
                     (place[i.wrapping_add_signed(distance as isize)], block.map(|r| r.map(|v| -v)))
                 });
                 order.clear();
-                order.extend(others.chain([(place[i], row.diagonal)]));
+                order.extend(others.chain([(place[i], *row.diagonal)]));
                 order.sort_unstable_by_key(|&(place, _)| place);
                 for component in 0..2 {
                     let own = 2 * place[i] + component;

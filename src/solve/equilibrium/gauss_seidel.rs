@@ -13,7 +13,8 @@ use crate::solve::stopwatch::Stopwatch;
 
 pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
     let begin = Stopwatch::start();
-    let Prepared { matrix, stencils, right, size, .. } = prepared;
+    let Prepared { matrix, right, size, .. } = &*prepared;
+    let stencils = prepared.stencils();
     let colours = colours(matrix);
     let mut u = Vectors::zeros(matrix.count());
     let mut r = Vectors::zeros(matrix.count());

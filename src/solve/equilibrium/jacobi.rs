@@ -9,7 +9,7 @@ use super::system::Prepared;
 use super::{Found, Request, SolveError, Solver, lanczos, steps};
 use crate::flock::block::{Block, inverse, product};
 use crate::flock::vectors::Vectors;
-use crate::solve::operator::Row;
+use crate::solve::operator::RowRef;
 use crate::solve::stopwatch::Stopwatch;
 
 /// Share of the largest damping that converges; below 1 since the eigenvalue is estimated from within,
@@ -21,7 +21,8 @@ const ESTIMATE: usize = 20;
 
 pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
     let begin = Stopwatch::start();
-    let Prepared { matrix, stencils, right, size, symmetric, .. } = prepared;
+    let Prepared { matrix, right, size, symmetric, .. } = &*prepared;
+    let stencils = prepared.stencils();
     let bound = matrix.rows.iter().map(row_sum).fold(1.0, f64::max);
     let largest = if *symmetric { lanczos::largest(matrix, stencils, ESTIMATE).min(bound) } else { bound };
     let weight = SHARE * 2.0 / largest;
@@ -38,13 +39,13 @@ pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found,
 }
 
 /// The sum of the norms of a row's blocks of `D^-1 K`: no eigenvalue is larger in modulus than the largest of all rows.
-pub(super) fn row_sum(row: &Row) -> f64 {
+pub(super) fn row_sum(row: RowRef<'_>) -> f64 {
     let norm = |block: &Block| block.iter().flatten().map(|v| v * v).sum::<f64>().sqrt();
     let spectral = |block: &Block| {
         let [[a, b], [c, d]] = *block;
         let (square, determinant) = (norm(block).powi(2), a * d - b * c);
         ((square + (square * square - 4.0 * determinant * determinant).max(0.0).sqrt()) / 2.0).sqrt()
     };
-    let inverse = inverse(&row.diagonal).unwrap_or_default();
+    let inverse = inverse(row.diagonal).unwrap_or_default();
     1.0 + row.entries.iter().map(|(_, block)| spectral(&product(&inverse, block))).sum::<f64>()
 }

@@ -11,7 +11,7 @@ use super::jacobi::row_sum;
 use super::steps::{Apply, precondition_group};
 use crate::flock::vectors::Vectors;
 use crate::solve::field::{Real, VectorsMut, dot};
-use crate::solve::operator::{Matrix, Row, RowCoefficients, pass};
+use crate::solve::operator::{Matrix, RowCoefficients, RowRef, pass};
 
 /// Share of the first residual's square below which the next one is rounding.
 const EXHAUSTED: f64 = 1e-24;
@@ -38,7 +38,7 @@ fn samples(matrix: &Matrix) -> Vec<usize> {
     let rows_of = |group: usize| matrix.runs_of(group).iter().map(|run| run.class as usize);
     let mut seen = vec![false; matrix.rows.len()];
     samples.iter().flat_map(|&group| rows_of(group)).for_each(|row| seen[row] = true);
-    let sum_of = |(row, seen): (&Row, &bool)| if *seen { 0.0 } else { row_sum(row) };
+    let sum_of = |(row, seen): (RowRef<'_>, &bool)| if *seen { 0.0 } else { row_sum(row) };
     let sums: Vec<f64> = matrix.rows.iter().zip(&seen).map(sum_of).collect();
     let odd_of =
         |group: usize| rows_of(group).filter(|&row| !seen[row]).map(|row| sums[row]).reduce(f64::max);

@@ -10,7 +10,6 @@ use super::system::Prepared;
 use super::{Request, Solver, System, by, steps};
 use crate::flock::vectors::Vectors;
 use crate::solve::field::dot;
-use crate::solve::operator::{Row, RowCoefficients};
 
 /// Roundings of a row, as far as they do not cancel.
 const ROUNDINGS: f64 = 4.0;
@@ -29,7 +28,7 @@ pub(super) fn known_to(
 ) -> Option<f64> {
     let right = prepared.scaled_right(system);
     let mut r = Vectors::zeros(right.len());
-    let left = steps::residual(&prepared.matrix, &prepared.stencils, (found, &right), &mut r).sqrt();
+    let left = steps::residual(&prepared.matrix, prepared.stencils(), (found, &right), &mut r).sqrt();
     if left > ROUNDINGS * f64::EPSILON * magnitude(prepared, found, &right) {
         return None;
     }
@@ -46,18 +45,10 @@ pub(super) fn known_to(
 
 /// `| |K| |u| + |f| |`: what the terms of a residual add up to before they cancel.
 fn magnitude(prepared: &Prepared, found: &Vectors<f64>, right: &Vectors<f64>) -> f64 {
-    let rows: Vec<Row> = prepared.matrix.rows.iter().map(absolute).collect();
-    let stencils = RowCoefficients::<f64>::new(&rows, 1.0);
+    let stencils = prepared.stencils().clone().absolute();
     let part = |values: &[f64], sign: f64| values.iter().map(|v| sign * v.abs()).collect();
     let u = Vectors { x: part(&found.x, 1.0), y: part(&found.y, 1.0) };
     let f = Vectors { x: part(&right.x, -1.0), y: part(&right.y, -1.0) };
     let mut sum = Vectors::zeros(found.len());
     steps::residual(&prepared.matrix, &stencils, (&u, &f), &mut sum).sqrt()
-}
-
-/// A row all of whose products add up.
-fn absolute(row: &Row) -> Row {
-    let size = |block: &[[f64; 2]; 2], sign: f64| block.map(|r| r.map(|v| sign * v.abs()));
-    let entries = row.entries.iter().map(|(offset, block)| (*offset, size(block, -1.0))).collect();
-    Row { diagonal: size(&row.diagonal, 1.0), entries }
 }

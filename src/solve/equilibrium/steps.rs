@@ -23,10 +23,17 @@ pub fn side_by_side<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOn
     if rayon::current_num_threads() > 1 { rayon::join(a, b) } else { (a(), b()) }
 }
 
-/// Does some work on a list, cut into as many pieces as there are threads, each of `least` or more; answers in order.
-pub fn in_pieces<P: Sync, R: Send>(list: &[P], least: usize, work: impl Fn(&[P]) -> Vec<R> + Sync) -> Vec<R> {
-    let size = list.len().div_ceil(rayon::current_num_threads()).max(least);
-    for_groups(list.chunks(size).collect(), |_, piece| work(piece)).into_iter().flatten().collect()
+/// Pieces that each thread is given of a list: those of a thread that has something else to do are another's.
+const PIECES: usize = 4;
+
+/// Does some work on a list, cut into pieces of `least` or more for the threads to share; answers in order.
+pub fn in_pieces<P: Sync, R: Send>(list: &[P], least: usize, work: impl Fn(&[P]) -> R + Sync) -> Vec<R> {
+    let pieces = match rayon::current_num_threads() {
+        1 => 1,
+        threads => PIECES * threads,
+    };
+    let size = list.len().div_ceil(pieces).max(least);
+    for_groups(list.chunks(size).collect(), |_, piece| work(piece))
 }
 
 /// The same on every group of a matrix that this rank owns; `parts` are theirs.

@@ -117,7 +117,7 @@ impl System {
 /// brings them near 1: no square of a force or stiffness then over- or underflows, and no bit changes.
 pub(super) struct Prepared {
     pub matrix: Matrix,
-    pub stencils: RowCoefficients<f64>,
+    stencils: OnceLock<RowCoefficients<f64>>,
     /// Right-hand side \[1\], shape \[count\].
     pub right: Vectors<f64>,
     /// `|right|` \[1\].
@@ -151,18 +151,20 @@ impl Prepared {
         }
         let force = power_of_two(right.x.iter().chain(&right.y).copied());
         right.x.iter_mut().chain(&mut right.y).for_each(|f| *f /= force);
-        let stiffness = power_of_two(matrix.rows.iter().flat_map(|row| row.diagonal.as_flattened()).copied());
-        for row in &mut matrix.rows {
-            let blocks = row.entries.iter_mut().map(|(_, block)| block).chain([&mut row.diagonal]);
-            blocks.flatten().flatten().for_each(|k| *k /= stiffness);
-        }
-        let stencils = RowCoefficients::new(&matrix.rows, 1.0);
+        let stiffness = power_of_two(matrix.rows.diagonals().as_flattened().as_flattened().iter().copied());
+        matrix.rows.blocks_mut().flatten().flatten().for_each(|k| *k /= stiffness);
+
         let size = dot(right.view(), right.view()).sqrt();
         let symmetric = system.asymmetric_pair().is_none();
         let scales = [1.0 / stiffness, force];
         let length = power_of_two(operator.grid.as_flattened().iter().copied());
         let grid = operator.grid.map(|vector| vector.map(|v| v / length));
-        Ok(Self { matrix, stencils, right, size, scales, grid, symmetric, team })
+        Ok(Self { matrix, stencils: OnceLock::new(), right, size, scales, grid, symmetric, team })
+    }
+
+    /// The rows as the passes of an iteration read them.
+    pub fn stencils(&self) -> &RowCoefficients<f64> {
+        self.stencils.get_or_init(|| RowCoefficients::new(&self.matrix, 1.0))
     }
 
     /// `|f - K u| / |f|` of these displacements, which is not what an iteration that never looks back takes
@@ -170,7 +172,7 @@ impl Prepared {
     pub fn residual(&self, system: &System, found: &Vectors<f64>) -> f64 {
         let right = self.scaled_right(system);
         let mut r = Vectors::zeros(right.len());
-        steps::residual(&self.matrix, &self.stencils, (found, &right), &mut r).sqrt() / self.size
+        steps::residual(&self.matrix, self.stencils(), (found, &right), &mut r).sqrt() / self.size
     }
 
     /// The right-hand side anew, for solvers use it up \[1\].
@@ -196,7 +198,8 @@ fn power_of_two(values: impl Iterator<Item = f64>) -> f64 {
 
 /// The first particle, counted from 0, that its own row does not hold back.
 fn loose(matrix: &Matrix) -> Option<usize> {
-    let loose: Vec<bool> = matrix.rows.iter().map(|row| inverse(&row.diagonal).is_none()).collect();
+    let loose: Vec<bool> =
+        matrix.rows.diagonals().iter().map(|diagonal| inverse(diagonal).is_none()).collect();
     // A class whose every particle has a held neighbour was replaced by others, and has no particles left.
     let any = loose.contains(&true);
     let is_loose = |&class: &u32| class != HELD && loose[class as usize];

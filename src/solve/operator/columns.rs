@@ -149,21 +149,23 @@ impl Columns {
             .then(|| ((segment.start as i32 + steps) as usize, (segment.len as i32 - steps) as usize))
     }
 
-    /// Index bounds of groups of whole columns of at least `size` particles but for the last, with the
-    /// number of the column that each begins with: `[begin of the first, ..., end of the last]`. Particles along an
-    /// outline are groups without columns.
-    pub fn groups(&self, size: usize, count: usize) -> (Vec<usize>, Vec<i32>) {
+    /// Index bounds of groups of whole columns that cost at least `size` but for the last, with the number of the column that
+    /// each begins with: `[begin of the first, ..., end of the last]`. `cost` is that of the particles before each and of all,
+    /// shape \[count + 1\]. Particles along an outline fill up the last one; what is left of them are groups without columns.
+    pub fn groups(&self, size: u32, cost: &[u32]) -> (Vec<usize>, Vec<i32>) {
         let (mut bounds, mut columns) = (vec![0], vec![self.first]);
-        for (c, &begin) in self.begins[..self.begins.len() - 1].iter().enumerate() {
-            if begin as usize - bounds[bounds.len() - 1] >= size {
+        let all = cost[cost.len() - 1];
+        let (&regular, begins) = self.begins.split_last().expect("an end");
+        let outliers = (regular..cost.len() as u32 - 1).map(|begin| (self.range().end, begin));
+        for (column, begin) in (self.first..).zip(begins.iter().copied()).chain(outliers) {
+            let done = cost[begin as usize];
+            if done - cost[bounds[bounds.len() - 1]] >= size && done < all {
                 bounds.push(begin as usize);
-                columns.push(self.first + c as i32);
+                columns.push(column);
             }
         }
-        let regular = self.begins.last().map_or(0, |&end| end as usize);
-        let outliers = (regular..count).step_by(size);
-        for bound in outliers.chain([count]).filter(|&bound| bound > 0) {
-            bounds.push(bound);
+        if cost.len() > 1 {
+            bounds.push(cost.len() - 1);
             columns.push(self.range().end);
         }
         (bounds, columns)
@@ -192,7 +194,8 @@ mod tests {
                     assert_eq!(columns.find([i, j]).map(|(index, _)| index), there, "{kind:?} {i} {j}");
                 }
             }
-            let (bounds, _) = columns.groups(30, body.count());
+            let cost: Vec<u32> = (0..=body.count() as u32).collect();
+            let (bounds, _) = columns.groups(30, &cost);
             assert!(bounds.windows(2).all(|w| w[0] < w[1]), "{bounds:?}");
         }
     }

@@ -6,6 +6,8 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::columns::Columns;
+use super::packs::Packs;
+use super::rows::Rows;
 use super::{Operator, Outliers, Row, Stretch, add};
 use crate::flock::block::Block;
 use crate::flock::body::Body;
@@ -17,9 +19,20 @@ use crate::solve::part::Part;
 /// Class of particles that do not follow.
 pub const HELD: u32 = u32::MAX;
 
-/// Fewest particles that a thread is given at a time: their vectors stay in its second cache over a few
-/// loops.
-const GROUP: usize = 1 << 13;
+/// About how many particles a thread is given at a time: their vectors stay in its second cache over a few loops.
+const GROUP: u32 = 1 << 13;
+
+/// What a particle in a pack costs, in particles of long runs.
+const PACKED: u32 = 3;
+
+/// Cost that is one thread's alone: two would wait for each other longer than they save.
+const ALONE: u32 = 14_000;
+
+/// Least cost of a group, of what all cost: one group up to [`ALONE`], and an even number of about as large ones above.
+fn group_size(cost: u32) -> u32 {
+    let groups = if cost <= ALONE { 1 } else { 2 * ((cost + GROUP) / (2 * GROUP)) };
+    cost.div_ceil(groups).max(1)
+}
 
 /// Consecutive particles of one class whose neighbours lie at the same index distances.
 #[derive(Clone, Copy, Debug)]
@@ -33,6 +46,17 @@ pub struct Run {
     pub terms: u32,
 }
 
+/// Particles from which on a run is gone over by itself; those of shorter ones are packed.
+const LONG: u32 = 4;
+
+impl Run {
+    /// Whether its particles are in packs.
+    #[inline(always)]
+    pub fn is_packed(&self) -> bool {
+        self.len < LONG
+    }
+}
+
 /// A square matrix over the followers. Vectors are as long as the body, zero at particles that are held.
 #[derive(Clone, Debug)]
 pub struct Matrix {
@@ -40,7 +64,7 @@ pub struct Matrix {
     pub columns: Columns,
     /// Row of each particle, [`HELD`] where it does not follow, shape \[count\].
     pub class: Vec<u32>,
-    pub rows: Vec<Row>,
+    pub rows: Rows,
     runs: Vec<Run>,
     distances: Vec<i32>,
     /// Index bounds of the groups of columns that threads work on, shape \[groups + 1\].
@@ -49,6 +73,8 @@ pub struct Matrix {
     pub group_columns: Vec<i32>,
     /// First run of each group, shape \[groups + 1\].
     group_runs: Vec<usize>,
+    /// Particles of short runs.
+    pub packs: Packs,
     pub outliers: Outliers,
     /// The part of this rank while several iterate with it; what they compute outside it is not known here.
     pub part: Option<Arc<Part>>,
@@ -56,7 +82,7 @@ pub struct Matrix {
 
 impl Matrix {
     /// `columns` hold the particles that have a class, and the entries of every row lead to such.
-    pub fn compile(columns: Columns, class: Vec<u32>, rows: Vec<Row>) -> Self {
+    pub fn compile(columns: Columns, class: Vec<u32>, rows: Rows) -> Self {
         let mut matrix = Self {
             columns,
             class,
@@ -66,26 +92,38 @@ impl Matrix {
             bounds: Vec::new(),
             group_columns: Vec::new(),
             group_runs: Vec::new(),
+            packs: Packs::default(),
             outliers: Outliers::default(),
             part: None,
         };
         matrix.outliers.first = matrix.class.len();
         matrix.find_runs();
-        matrix.group(GROUP);
+        matrix.group(group_size);
         matrix
     }
 
-    /// Cuts the body into groups of at least so many particles.
-    fn group(&mut self, size: usize) {
-        (self.bounds, self.group_columns) = self.columns.groups(size, self.class.len());
+    /// Cuts the body into groups that cost at least `size` of what all cost.
+    fn group(&mut self, size: impl FnOnce(u32) -> u32) {
+        let mut cost = vec![0; self.count() + 1];
+        for run in &self.runs {
+            let each = if run.is_packed() { PACKED } else { 1 };
+            cost[run.start as usize + 1..][..run.len as usize].fill(each);
+        }
+        let mut sum = 0;
+        for cost in &mut cost {
+            sum += *cost;
+            *cost = sum;
+        }
+        (self.bounds, self.group_columns) = self.columns.groups(size(sum), &cost);
         let first = |&bound: &usize| self.runs.partition_point(|run| (run.start as usize) < bound);
         self.group_runs = self.bounds.iter().map(first).collect();
+        self.packs = Packs::new(self);
     }
 
     /// The same in groups of another size.
     #[cfg(test)]
-    pub fn regrouped(mut self, size: usize) -> Self {
-        self.group(size);
+    pub fn regrouped(mut self, size: u32) -> Self {
+        self.group(|_| size);
         self
     }
 
@@ -93,14 +131,19 @@ impl Matrix {
     pub fn of_followers(operator: &Operator) -> Self {
         let columns = Columns::new(operator.columns.sites(), |i| operator.follows[i]);
         let mut class = vec![HELD; operator.count()];
-        let mut rows = operator.rows.clone();
+        let entries = operator.rows.iter().map(|row| row.entries.len()).max().unwrap_or_default();
+        let mut rows = Rows::with_capacity(operator.rows.len(), entries);
+        operator.rows.iter().for_each(|row| rows.push(row.diagonal, row.entries.iter().copied()));
         let mut known = HashMap::new();
+        // How many particles before each have something held.
+        let mut held = vec![0u32];
+        held.extend((0..operator.count()).scan(0, |held, i| {
+            *held += u32::from(!operator.follows[i] || operator.held_axes(i) != [false; 2]);
+            Some(*held)
+        }));
         operator.stretches(|Stretch { start, len, class: full, .. }, firsts| {
             let firsts = || firsts.iter().map(|first| first.expect("checked when made"));
-            let is_whole = |i: usize| operator.follows[i] && operator.held_axes(i) == [false; 2];
-            let own = (start..start + len).all(is_whole);
-            let free = own && firsts().all(|j| (j..j + len).all(is_whole));
-            if free {
+            if std::iter::once(start).chain(firsts()).all(|first| held[first] == held[first + len]) {
                 class[start..start + len].fill(full);
                 return None::<()>;
             }
@@ -115,7 +158,7 @@ impl Matrix {
                 let follows: Vec<bool> = firsts().map(|j| operator.follows[j + k]).collect();
                 class[start + k] =
                     *known.entry((full, free, follows)).or_insert_with_key(|(full, free, follows)| {
-                        rows.push(without_held(&operator.rows[*full as usize], free, follows));
+                        push_without_held(&mut rows, &operator.rows[*full as usize], free, follows);
                         rows.len() as u32 - 1
                     });
             }
@@ -185,7 +228,7 @@ impl Matrix {
 
     /// Most columns and rows that an entry between two sites of the lattice reaches.
     pub fn reach(&self) -> [i32; 2] {
-        let entries = self.rows.iter().flat_map(|row| &row.entries);
+        let entries = self.rows.iter().flat_map(|row| row.entries);
         let entries = entries.filter(|(offset, _)| !leads_to_outlier(*offset));
         entries.fold([0, 0], |far, (o, _)| [far[0].max(o[0].abs()), far[1].max(o[1].abs())])
     }
@@ -204,7 +247,7 @@ impl Matrix {
                 let site = [column, segment.row + self.columns.step() * done as i32];
                 found.clear();
                 found.push(0);
-                for (offset, _) in &self.rows[class as usize].entries {
+                for (offset, _) in self.rows.of(class).entries {
                     let (there, room) =
                         self.columns.find(add(site, *offset)).expect("rows lead to followers");
                     len = len.min(room);
@@ -229,10 +272,10 @@ pub fn leads_to_outlier([columns, _]: Site) -> bool {
     columns.abs() > Body::ALONG_OUTLINE / 2
 }
 
-/// A row in unknown components alone: `free` are those of the particle itself and of each neighbour, of which only
+/// Adds a row in unknown components alone: `free` are those of the particle itself and of each neighbour, of which only
 /// those that follow have a place in the matrix. A held component keeps its place on the diagonal and is moved by
 /// nothing.
-fn without_held(row: &Row, free: &[[bool; 2]], follows: &[bool]) -> Row {
+fn push_without_held(rows: &mut Rows, row: &Row, free: &[[bool; 2]], follows: &[bool]) {
     let own = free[0];
     let keep = |block: &Block, other: [bool; 2]| -> Block {
         std::array::from_fn(|a| std::array::from_fn(|b| if own[a] && other[b] { block[a][b] } else { 0.0 }))
@@ -242,6 +285,5 @@ fn without_held(row: &Row, free: &[[bool; 2]], follows: &[bool]) -> Row {
         diagonal[axis][axis] = row.diagonal[axis][axis];
     }
     let entries = row.entries.iter().zip(&free[1..]).zip(follows).filter(|(_, follows)| **follows);
-    let entries = entries.map(|(((offset, block), other), _)| (*offset, keep(block, *other)));
-    Row { diagonal, entries: entries.collect() }
+    rows.push(diagonal, entries.map(|(((offset, block), other), _)| (*offset, keep(block, *other))));
 }

@@ -28,7 +28,7 @@ fn the_compiled_matrix_is_the_rows_over_the_followers() {
     for kind in LatticeKind::SAMPLES {
         let operator = operator(kind, 41, 53, |i| i < 30 || i % 97 == 5);
         let matrix = Matrix::of_followers(&operator);
-        let stencils = RowCoefficients::<f64>::new(&matrix.rows, 2.0);
+        let stencils = RowCoefficients::<f64>::new(&matrix, 2.0);
         let mut u = noise(operator.count());
         for i in (0..operator.count()).filter(|&i| !operator.follows()[i]) {
             (u.x[i], u.y[i]) = (0.0, 0.0);

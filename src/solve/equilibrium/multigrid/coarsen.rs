@@ -4,7 +4,6 @@
 //! different pattern of them is a class, and its row is computed once.
 
 use std::collections::HashMap;
-use std::ops::Range;
 
 use super::sums::Sums;
 use super::transfer::{OutlierShares, Transfer, parents_of_place};
@@ -12,7 +11,7 @@ use crate::flock::block::Block;
 use crate::flock::body::Body;
 use crate::flock::lattice::Site;
 use crate::solve::equilibrium::steps::in_pieces;
-use crate::solve::operator::{Columns, HELD, Matrix, Outliers, Row, leads_to_outlier};
+use crate::solve::operator::{Columns, HELD, Matrix, Outliers, RowRef, Rows, leads_to_outlier};
 
 /// How much coarser the first grid is than the lattice, in particles per node.
 const FIRST_RATIO: f64 = 4.0;
@@ -52,6 +51,9 @@ pub fn next_steps(spacing: [f64; 2]) -> [i32; 2] {
 /// Fewest rows of a coarse grid that a thread sums: what two threads share of their surroundings each computes for itself.
 const PIECE: usize = 64;
 
+/// About how many others a node feels; more of memory that is not written to costs nothing.
+const NEIGHBOURS: usize = 16;
+
 /// The matrix of the coarse grid, and the shares of particles at no site in its nodes.
 pub fn coarsen(fine: &Matrix, transfer: Transfer) -> (Matrix, OutlierShares) {
     let parents = Parents::new(transfer.steps);
@@ -83,20 +85,32 @@ pub fn coarsen(fine: &Matrix, transfer: Transfer) -> (Matrix, OutlierShares) {
     // Neighbours share halves: those that are summed one after the other are to lie side by side.
     singles.sort_by_key(|(node, _)| *node);
     let patterns: Vec<&[u32]> = patterns.iter().collect();
-    let mut rows = in_pieces(&patterns, PIECE, |patterns| {
-        let mut sums = Sums::default();
-        patterns.iter().map(|pattern| galerkin(fine, &parents, pattern, &mut sums)).collect()
+    let mut pieces = in_pieces(&patterns, PIECE, |patterns| {
+        let (mut rows, mut sums) = (Rows::with_capacity(patterns.len(), NEIGHBOURS), Sums::default());
+        for pattern in patterns {
+            galerkin(fine, &parents, pattern, &mut sums);
+            rows.push_blocks(sums.drain());
+        }
+        rows
     });
-    nodes.extend((rows.len() as u32..).zip(&singles).map(|(class, (node, _))| (*node, class)));
-    rows.extend(in_pieces(&singles, PIECE, |singles| {
-        let (mut halves, mut sums) = (Halves::new(fine, &parents, &of_outliers), Sums::default());
-        singles.iter().map(|(node, of_node)| halves.row(*node, of_node, &mut sums)).collect()
+    nodes.extend((patterns.len() as u32..).zip(&singles).map(|(class, (node, _))| (*node, class)));
+    pieces.extend(in_pieces(&singles, PIECE, |singles| {
+        let (mut rows, mut sums) = (Rows::with_capacity(singles.len(), NEIGHBOURS), Sums::default());
+        let mut halves = Halves::new(fine, &parents, &of_outliers);
+        for (node, of_node) in singles {
+            halves.add_row(*node, of_node, &mut sums);
+            rows.push_blocks(sums.drain());
+        }
+        rows
     }));
     // Ascending lists one after the other, which a stable sort joins.
     nodes.sort();
     let columns = Columns::new(nodes.iter().map(|&(site, _)| site), |_| true);
     let shares = of_outliers.shares(&nodes);
-    (Matrix::compile(columns, nodes.into_iter().map(|(_, class)| class).collect(), rows), shares)
+    (
+        Matrix::compile(columns, nodes.into_iter().map(|(_, class)| class).collect(), Rows::joined(&pieces)),
+        shares,
+    )
 }
 
 /// The nodes around the particles that stand at no site.
@@ -152,15 +166,32 @@ impl OutlierParents {
     }
 }
 
+/// Where a particle's row of `K P` lies.
+#[derive(Clone, Copy, Default)]
+struct Half {
+    /// Coarse column in which it was asked for.
+    column: i32,
+    start: u32,
+    len: u32,
+}
+
+/// Which of two lists is a column's.
+fn parity(column: i32) -> usize {
+    column.rem_euclid(2) as usize
+}
+
 /// Rows of `K P`, each computed when it is first asked for: up to four nodes have a share in a particle.
 struct Halves<'a> {
     fine: &'a Matrix,
     parents: &'a Parents,
     of_outliers: &'a OutlierParents,
-    /// Rows one after the other, by nodes.
-    all: Vec<(Site, Block)>,
+    /// Rows one after the other, by nodes: those that were asked for in this coarse column, and in the one before, lie in turn
+    /// in either list. Later ones do not ask for them again, or if they do they are computed anew.
+    lists: [Vec<(Site, Block)>; 2],
     /// Where that of each particle lies, shape \[count\]; empty where there are no particles at no site.
-    of_particle: Vec<Range<u32>>,
+    of_particle: Vec<Half>,
+    /// The column that is being summed.
+    column: i32,
     /// The one that is being summed.
     sums: Sums,
 }
@@ -172,14 +203,19 @@ impl<'a> Halves<'a> {
             fine,
             parents,
             of_outliers,
-            all: Vec::new(),
-            of_particle: vec![0..0; count],
+            lists: Default::default(),
+            of_particle: vec![Half::default(); count],
+            column: i32::MIN,
             sums: Sums::default(),
         }
     }
 
-    /// The row of `P' K P` at a node.
-    fn row(&mut self, node: Site, outliers: &[Child], sums: &mut Sums) -> Row {
+    /// Adds up the row of `P' K P` at a node.
+    fn add_row(&mut self, node: Site, outliers: &[Child], sums: &mut Sums) {
+        if self.column != node[0] {
+            self.column = node[0];
+            self.lists[parity(node[0])].clear();
+        }
         let [across, along] = self.parents.steps;
         let (first, step) = (self.of_outliers.first, self.fine.columns.step());
         let near = |k: usize, step: i32| node[k] * step - step + 1..node[k] * step + step;
@@ -195,31 +231,33 @@ impl<'a> Halves<'a> {
             let site = [Body::ALONG_OUTLINE, (particle - first) as i32 * step];
             self.add_half(node, site, (particle, share), sums);
         }
-        sums.row()
     }
 
     /// Adds a particle's row of `K P` by offsets from a node that has a share in it.
     fn add_half(&mut self, node: Site, site: Site, (i, share): (usize, f64), sums: &mut Sums) {
-        if self.of_particle[i].is_empty() {
-            self.find(node, site, i);
+        let mut half = self.of_particle[i];
+        if half.len == 0 || half.column < self.column - 1 {
+            half = self.find(node, site, i);
+            self.of_particle[i] = half;
         }
-        let Range { start, end } = self.of_particle[i];
-        for (other, block) in &self.all[start as usize..end as usize] {
+        let Half { column, start, len } = half;
+        for (other, block) in &self.lists[parity(column)][start as usize..][..len as usize] {
             sums.add([other[0] - node[0], other[1] - node[1]], share, block);
         }
     }
 
     /// Computes a particle's row of `K P`, summed by offsets from a node close to it.
-    fn find(&mut self, near: Site, site: Site, i: usize) {
-        let row = &self.fine.rows[self.fine.class[i] as usize];
-        self.add_parents(near, site, (1.0, &row.diagonal));
-        for (offset, block) in &row.entries {
+    fn find(&mut self, near: Site, site: Site, i: usize) -> Half {
+        let row = self.fine.rows.of(self.fine.class[i]);
+        self.add_parents(near, site, (1.0, row.diagonal));
+        for (offset, block) in row.entries {
             self.add_parents(near, [site[0] + offset[0], site[1] + offset[1]], (-1.0, block));
         }
-        let begin = self.all.len();
+        let list = &mut self.lists[parity(self.column)];
+        let start = list.len() as u32;
         let absolute = |(offset, block): (Site, Block)| ([offset[0] + near[0], offset[1] + near[1]], block);
-        self.all.extend(self.sums.drain().map(absolute));
-        self.of_particle[i] = begin as u32..self.all.len() as u32;
+        list.extend(self.sums.drain().map(absolute));
+        Half { column: self.column, start, len: list.len() as u32 - start }
     }
 
     /// Adds a block by the nodes that have a share in the particle at a site, as offsets from one of them.
@@ -256,14 +294,14 @@ struct Patterns {
 impl Patterns {
     fn new(fine: &Matrix, transfer: Transfer) -> Self {
         let width = 2 * transfer.steps[0] as usize - 1;
-        let leads = |row: &Row| row.entries.iter().any(|(offset, _)| leads_to_outlier(*offset));
-        let rows = if fine.outliers.places.is_empty() { &[] } else { &fine.rows[..] };
+        let leads = |row: RowRef<'_>| row.entries.iter().any(|(offset, _)| leads_to_outlier(*offset));
+        let rows = if fine.outliers.places.is_empty() { 0 } else { fine.rows.len() };
         Self {
             transfer,
             known: HashMap::new(),
             all: Vec::new(),
             around: vec![Vec::new(); width],
-            leads: rows.iter().map(leads).collect(),
+            leads: fine.rows.iter().take(rows).map(leads).collect(),
         }
     }
 
@@ -341,22 +379,21 @@ impl Patterns {
     }
 }
 
-/// The row of `P' K P` at a node with these surroundings.
-fn galerkin(fine: &Matrix, parents: &Parents, pattern: &[u32], sums: &mut Sums) -> Row {
+/// Adds up the row of `P' K P` at a node with these surroundings.
+fn galerkin(fine: &Matrix, parents: &Parents, pattern: &[u32], sums: &mut Sums) {
     let [across, along] = parents.steps;
     let reach = 2 * along - 1;
     for (k, &class) in pattern.iter().enumerate().filter(|(_, class)| **class != HELD) {
         let own = [k as i32 / reach - across + 1, k as i32 % reach - along + 1];
         let share = parents.hat(0, own[0]) * parents.hat(1, own[1]);
-        let row = &fine.rows[class as usize];
+        let row = fine.rows.of(class);
         let entries = row.entries.iter().map(|(offset, block)| (*offset, block, -share));
-        for (offset, block, share) in std::iter::once(([0, 0], &row.diagonal, share)).chain(entries) {
+        for (offset, block, share) in std::iter::once(([0, 0], row.diagonal, share)).chain(entries) {
             let there = [own[0] + offset[0], own[1] + offset[1]];
             let (node, shares) = parents.around(there, share);
             sums.add_around(node, shares, block);
         }
     }
-    sums.row()
 }
 
 /// The nodes that have a share in a site of the fine grid, by columns and by rows.

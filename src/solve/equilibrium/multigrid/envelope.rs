@@ -58,7 +58,7 @@ impl Plan {
         nodes.iter().enumerate().for_each(|(at, &(_, node))| place[node as usize] = at as u32);
         let (mut first, mut starts) = (Vec::new(), vec![0]);
         for (at, &(site, node)) in nodes.iter().enumerate() {
-            let entries = matrix.rows[matrix.class[node as usize] as usize].entries.iter();
+            let entries = matrix.rows.of(matrix.class[node as usize]).entries.iter();
             let places = entries.map(|&(offset, _)| place[index(matrix, site, offset)]);
             let before = 2 * places.fold(at as u32, u32::min);
             for row in 2 * at..2 * at + 2 {
@@ -95,12 +95,12 @@ impl Envelope {
             x: vec![0.0; unknowns],
         };
         for (here, &(site, node)) in plan.nodes.iter().enumerate() {
-            let row = &matrix.rows[matrix.class[node as usize] as usize];
+            let row = matrix.rows.of(matrix.class[node as usize]);
             let others = row.entries.iter().map(|(offset, block)| {
                 let there = plan.place[index(matrix, site, *offset)] as usize;
                 (there, block.map(|row| row.map(|v| -v)))
             });
-            for (there, block) in others.chain([(here, row.diagonal)]) {
+            for (there, block) in others.chain([(here, *row.diagonal)]) {
                 for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
                     if 2 * there + b <= 2 * here + a {
                         *factor.entry(2 * here + a, 2 * there + b) = block[a][b] * scale;

@@ -56,15 +56,18 @@ const SMOOTHED: f64 = 5.0;
 pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
     let begin = Stopwatch::start();
     let right = std::mem::take(&mut prepared.right);
-    let mut cycle = Cycle::new(&prepared.matrix, prepared.grid)?;
+    let (cycle, _) = side_by_side(|| Cycle::new(&prepared.matrix, prepared.grid), || prepared.stencils());
+    let mut cycle = cycle?;
     let set_up = begin.elapsed();
     tracing::debug!(levels = cycle.levels.len() + 1, "multigrid is set up");
     let found = match request.precision {
         Precision::F64 => {
-            iterate(prepared, &prepared.stencils, right, &mut cycle, request, Solver::Multigrid)
+            iterate(prepared, prepared.stencils(), right, &mut cycle, request, Solver::Multigrid)
         }
         Precision::F32 => {
-            let stencils = cycle.finest.clone();
+            let finest = cycle.smoothers.first().map(|smoother| smoother.stencils.clone());
+            let stencils = finest
+                .unwrap_or_else(|| RowCoefficients::new(&prepared.matrix, single_scale(&prepared.matrix)));
             iterate_single(prepared, &stencils, right, &mut cycle, request, Solver::Multigrid)
         }
     }?;
@@ -74,10 +77,10 @@ pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found,
 /// All levels of a body.
 struct Cycle<'a> {
     matrix: &'a Matrix,
-    finest: RowCoefficients<f32>,
-    weights: [f64; 2],
     vectors: LevelVectors,
-    /// The way down from each level, the finest first; the coarsest is not smoothed and has no weights.
+    /// Of each level but the coarsest, the finest first.
+    smoothers: Vec<Smoother>,
+    /// The way down from each of them.
     levels: Vec<Level>,
     coarsest: Option<Envelope>,
 }
@@ -87,8 +90,6 @@ struct Level {
     transfer: Transfer,
     outliers: OutlierShares,
     matrix: Matrix,
-    stencils: RowCoefficients<f32>,
-    weights: [f64; 2],
     vectors: LevelVectors,
     /// Between ranks, where they share the levels.
     transfers: Option<Transfers>,
@@ -128,26 +129,33 @@ impl LevelVectors {
     }
 }
 
-/// Weights of two sweeps that dampen all eigenvalues from a share of the largest to the largest best;
-/// `None` if the matrix is not positive.
-fn weights(matrix: &Matrix, stencils: &RowCoefficients<f32>) -> Option<[f64; 2]> {
-    let high = SAFETY * lanczos::largest(matrix, stencils, ESTIMATE);
-    let low = high / SMOOTHED;
-    let weight = |k: f64| {
-        let node = (std::f64::consts::PI * k / 4.0).cos();
-        1.0 / (f64::midpoint(high, low) + (high - low) / 2.0 * node)
-    };
-    high.is_finite().then(|| [1.0, 3.0].map(weight))
+/// What a level is smoothed with.
+struct Smoother {
+    stencils: RowCoefficients<f32>,
+    /// Weights of two sweeps that dampen all eigenvalues from a share of the largest to the largest best.
+    weights: [f64; 2],
+}
+
+impl Smoother {
+    /// The rows of a level multiplied by `scale`; `None` if its matrix is not positive.
+    fn new(matrix: &Matrix, scale: f64) -> Option<Self> {
+        let stencils = RowCoefficients::new(matrix, scale);
+        let high = SAFETY * lanczos::largest(matrix, &stencils, ESTIMATE);
+        let low = high / SMOOTHED;
+        let weight = |k: f64| {
+            let node = (std::f64::consts::PI * k / 4.0).cos();
+            1.0 / (f64::midpoint(high, low) + (high - low) / 2.0 * node)
+        };
+        high.is_finite().then(|| Self { stencils, weights: [1.0, 3.0].map(weight) })
+    }
 }
 
 impl<'a> Cycle<'a> {
     fn new(matrix: &'a Matrix, grid: [[f64; 2]; 2]) -> Result<Self, SolveError> {
         let scale = single_scale(matrix);
-        let finest = RowCoefficients::new(&matrix.rows, scale);
         let not_positive = SolveError::NotPositive { solver: Solver::Multigrid, iteration: 0 };
         let vectors = LevelVectors::new(matrix.count());
-        let mut cycle =
-            Self { matrix, finest, weights: [0.0; 2], vectors, levels: Vec::new(), coarsest: None };
+        let mut cycle = Self { matrix, vectors, smoothers: Vec::new(), levels: Vec::new(), coarsest: None };
         let mut spacing = grid.map(|v| v[0].hypot(v[1]));
         while !cycle.is_coarse_enough() {
             let fine = cycle.levels.last().map_or(matrix, |level| &level.matrix);
@@ -155,14 +163,12 @@ impl<'a> Cycle<'a> {
                 0 => coarsen::first_steps(grid, particles_per_site(fine)),
                 _ => coarsen::next_steps(spacing),
             };
-            let stencils = cycle.levels.last().map_or(&cycle.finest, |level| &level.stencils);
-            let (level, found) =
-                side_by_side(|| Level::new(fine, Transfer { steps }, scale), || weights(fine, stencils));
+            let (level, smoother) =
+                side_by_side(|| Level::new(fine, Transfer { steps }), || Smoother::new(fine, scale));
             if level.matrix.count() >= fine.count() {
                 break;
             }
-            let found = found.ok_or(not_positive.clone())?;
-            *cycle.levels.last_mut().map_or(&mut cycle.weights, |level| &mut level.weights) = found;
+            cycle.smoothers.push(smoother.ok_or(not_positive.clone())?);
             spacing = [0, 1].map(|k| spacing[k] * f64::from(steps[k]));
             cycle.levels.push(level);
         }
@@ -180,23 +186,21 @@ impl<'a> Cycle<'a> {
 
     /// `v` of the finest level becomes the cycle's answer to its `f`.
     fn run(&mut self) {
-        let Self { matrix, finest, weights, vectors, levels, coarsest, .. } = self;
-        let top = Smoothed { matrix, stencils: finest, weights: *weights };
-        descend(&top, vectors, levels, coarsest.as_mut().expect("set up"));
+        let Self { matrix, vectors, smoothers, levels, coarsest } = self;
+        descend(matrix, vectors, (smoothers, levels), coarsest.as_mut().expect("set up"));
     }
 }
 
-/// A level's operator and smoother.
-struct Smoothed<'a> {
-    matrix: &'a Matrix,
-    stencils: &'a RowCoefficients<f32>,
-    weights: [f64; 2],
-}
-
-fn descend(here: &Smoothed<'_>, vectors: &mut LevelVectors, below: &mut [Level], coarsest: &mut Envelope) {
-    let Smoothed { matrix, stencils, weights } = *here;
+fn descend(
+    matrix: &Matrix,
+    vectors: &mut LevelVectors,
+    (smoothers, below): (&[Smoother], &mut [Level]),
+    coarsest: &mut Envelope,
+) {
     let LevelVectors { f, u, v } = vectors;
-    let Some((next, further)) = below.split_first_mut() else {
+    let (Some((Smoother { stencils, weights }, smoothers)), Some((next, further))) =
+        (smoothers.split_first(), below.split_first_mut())
+    else {
         solve_coarsest(matrix, coarsest, f, v);
         return;
     };
@@ -210,8 +214,7 @@ fn descend(here: &Smoothed<'_>, vectors: &mut LevelVectors, below: &mut [Level],
     }
     let levels = (matrix, &next.matrix);
     next.transfer.restrict(levels, &next.outliers, u, &mut next.vectors.f);
-    let view = Smoothed { matrix: &next.matrix, stencils: &next.stencils, weights: next.weights };
-    descend(&view, &mut next.vectors, further, coarsest);
+    descend(&next.matrix, &mut next.vectors, (smoothers, further), coarsest);
     if let Some(Transfers { team, up, .. }) = &next.transfers {
         up.receive(team, &mut next.vectors.v);
     }
@@ -233,16 +236,15 @@ fn solve_coarsest(matrix: &Matrix, coarsest: &mut Envelope, f: &mut Vectors<f32>
 }
 
 impl Level {
-    fn new(fine: &Matrix, transfer: Transfer, scale: f64) -> Self {
+    fn new(fine: &Matrix, transfer: Transfer) -> Self {
         let (mut matrix, outliers) = coarsen::coarsen(fine, transfer);
         let part = fine.part.as_ref().map(|part| Part::new(&part.team, &matrix));
         let with_part = fine.part.as_deref().zip(part.as_ref());
         let transfers = with_part
             .map(|(above, here)| Transfers::new([(above, fine), (here, &matrix)], transfer, &outliers));
         matrix.part = part.map(Arc::new);
-        let stencils = RowCoefficients::new(&matrix.rows, scale);
         let vectors = LevelVectors::new(matrix.count());
-        Self { transfer, outliers, matrix, stencils, weights: [0.0; 2], vectors, transfers }
+        Self { transfer, outliers, matrix, vectors, transfers }
     }
 }
 

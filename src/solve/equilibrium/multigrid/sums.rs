@@ -2,7 +2,6 @@
 
 use crate::flock::block::Block;
 use crate::flock::lattice::Site;
-use crate::solve::operator::Row;
 
 /// Columns and rows around a node that a fresh window holds; most rows need no more.
 const RADIUS: i32 = 2;
@@ -55,19 +54,6 @@ impl Sums {
         })
     }
 
-    /// The row that has been added up.
-    pub fn row(&mut self) -> Row {
-        let blocks = self.window.iter().map(|block| usize::from(!is_zero(block))).sum();
-        let mut row = Row { entries: Vec::with_capacity(blocks), ..Row::default() };
-        for (offset, block) in self.drain() {
-            match offset {
-                [0, 0] => row.diagonal = block,
-                _ => row.entries.push((offset, block.map(|row| row.map(|v| -v)))),
-            }
-        }
-        row
-    }
-
     /// Where an offset lies in the window, which reaches `far` at least.
     #[inline]
     fn at(&mut self, offset: Site, far: i32) -> usize {
@@ -104,6 +90,7 @@ fn is_zero(block: &Block) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solve::operator::Rows;
 
     #[test]
     fn blocks_are_added_up_by_offset_and_come_out_in_order() {
@@ -116,8 +103,10 @@ mod tests {
             {
                 sums.add(offset, share, &block(1.0));
             }
-            let row = sums.row();
-            assert_eq!(row.diagonal, block(2.0));
+            let mut rows = Rows::default();
+            rows.push_blocks(sums.drain());
+            let row = rows.of(0);
+            assert_eq!(*row.diagonal, block(2.0));
             assert_eq!(row.entries, [([0, 1], block(-4.0)), ([9, -4], block(-0.5))]);
         }
     }

@@ -9,7 +9,7 @@ use crate::solve::operator::HELD;
 use crate::solve::operator::samples::{operator, with_outliers};
 
 fn dense(matrix: &Matrix) -> Vec<Vec<f64>> {
-    let stencils = RowCoefficients::<f64>::new(&matrix.rows, 1.0);
+    let stencils = RowCoefficients::<f64>::new(matrix, 1.0);
     columns(matrix.count(), |unit| {
         let mut out = Vectors::zeros(matrix.count());
         steps::apply(matrix, &stencils, unit, &mut out);
@@ -144,7 +144,7 @@ fn the_envelope_solves_what_it_factorised() {
                 exact.y[i] = (i as f32 * 0.3).cos();
             }
             let mut f = Vectors::zeros(matrix.count());
-            steps::apply(&matrix, &RowCoefficients::<f32>::new(&matrix.rows, 1.0), &exact, &mut f);
+            steps::apply(&matrix, &RowCoefficients::<f32>::new(&matrix, 1.0), &exact, &mut f);
             let mut found = Vectors::zeros(matrix.count());
             factor.solve((&f.x, &f.y), (&mut found.x, &mut found.y));
             let worst = (0..matrix.count()).map(|i| (found.x[i] - exact.x[i]).abs()).fold(0.0, f32::max);
@@ -156,9 +156,8 @@ fn the_envelope_solves_what_it_factorised() {
 #[test]
 fn the_envelope_refuses_what_is_not_positive_and_leaves_out_what_is_nothing() {
     let mut matrix = Matrix::of_followers(&operator(LatticeKind::SAMPLES[0], 9, 9, |i| i < 5));
-    for row in &mut matrix.rows {
-        row.diagonal[1][1] -= 2.0;
-    }
+    let rows = matrix.rows.len();
+    matrix.rows.blocks_mut().take(rows).for_each(|diagonal| diagonal[1][1] -= 2.0);
     assert!(Envelope::new(&matrix, 1.0, false).is_none());
     // A strip one particle wide between two columns of nodes: they are twice as many as can move.
     let sites: Vec<Site> = (0..40).map(|j| [1, j]).collect();
@@ -184,7 +183,7 @@ fn the_envelope_refuses_what_is_not_positive_and_leaves_out_what_is_nothing() {
     let mut exact = Vectors::zeros(fine.count());
     transfer.prolong((&fine, &coarse), &none, &nodes, &mut exact);
     let (mut f, mut coarse_f) = (Vectors::zeros(fine.count()), Vectors::zeros(coarse.count()));
-    steps::apply(&fine, &RowCoefficients::<f32>::new(&fine.rows, 1.0), &exact, &mut f);
+    steps::apply(&fine, &RowCoefficients::<f32>::new(&fine, 1.0), &exact, &mut f);
     transfer.restrict((&fine, &coarse), &none, &f, &mut coarse_f);
     let (mut solved, mut found) = (Vectors::zeros(coarse.count()), Vectors::zeros(fine.count()));
     factor.solve((&coarse_f.x, &coarse_f.y), (&mut solved.x, &mut solved.y));
