@@ -182,8 +182,7 @@ impl Mechanics {
         let u = engine.displacements();
         let own = engine.owned_cells();
         let finite = |values: &mut dyn Iterator<Item = f64>| {
-            let [largest] =
-                engine.largest_of_parts([values.filter(|v| v.is_finite()).fold(0.0, f64::max)]);
+            let [largest] = engine.largest_of_parts([values.filter(|v| v.is_finite()).fold(0.0, f64::max)]);
             largest
         };
         Some(Self {
@@ -248,7 +247,8 @@ fn strain_energy(engine: &Engine, elastic: &Elastic, forces: Option<&Forces>, u:
     let sum = |own: &mut dyn Iterator<Item = f64>| engine.sum_of_parts([-0.0], own.map(|own| [own]))[0];
     let over = Over { cells: engine.owned_cells(), particles: engine.body().owned(), sum: &sum };
     let rotation = rotation(engine);
-    let of_cells = engine.cells().map(|cells| stress::strain_energy_over(cells, elastic, (u, rotation), &over));
+    let of_cells =
+        engine.cells().map(|cells| stress::strain_energy_over(cells, elastic, (u, rotation), &over));
     of_cells.and_then(Result::ok).unwrap_or(f64::NAN)
 }
 

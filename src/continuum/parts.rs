@@ -235,11 +235,12 @@ pub fn agreed<T>(scene: &Scene, team: &Team, own: Result<T, SceneError>) -> Resu
     let first = all.iter().find(|words| !words.is_empty());
     match (own, first) {
         (Ok(own), None) => Ok(own),
-        (own, Some(words)) => {
-            let text = String::from_utf8_lossy(words);
+        (own, Some(first)) => {
+            let text = String::from_utf8_lossy(first);
             let mut parts = text.split('\0');
             let [key, message, help] = std::array::from_fn(|_| parts.next().unwrap_or_default());
-            Err(own.err().unwrap_or_else(|| scene.refuse(key, message, help)))
+            let own = own.err().filter(|_| words == *first);
+            Err(own.unwrap_or_else(|| scene.refuse(key, message, help)))
         }
         (Err(own), None) => Err(own),
     }

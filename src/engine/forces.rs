@@ -102,7 +102,8 @@ impl Forces {
     /// `None` where no part of the body has a particle that the entry holds; `held` are those of this one.
     fn reaction_of(&self, engine: &Engine, entry: usize, held: &[Held]) -> Option<Reaction> {
         let particles = engine.count_of_parts(held.len());
-        let sum = |of: &dyn Fn(Held) -> [f64; 2]| engine.sum_of_parts([0.0; 2], held.iter().map(|&one| of(one)));
+        let sum =
+            |of: &dyn Fn(Held) -> [f64; 2]| engine.sum_of_parts([0.0; 2], held.iter().map(|&one| of(one)));
         let mean = |points: &Vectors| sum(&|one| points.get(one.particle)).map(|s| s / particles as f64);
         if particles == 0 {
             return None;

@@ -311,7 +311,11 @@ impl Outlay<'_> {
             Cut::Shape(shape) => shape.bounds(),
             Cut::Count { .. } => ([0.0; 2], [0.0; 2]),
         };
-        BodyError::Empty { spacing: self.lattice.spacing(), width: high[0] - low[0], height: high[1] - low[1] }
+        BodyError::Empty {
+            spacing: self.lattice.spacing(),
+            width: high[0] - low[0],
+            height: high[1] - low[1],
+        }
     }
 
     /// Lays out the whole body, or what of it stands in some columns, with the neighbours that stand there too.

@@ -170,9 +170,9 @@ fn bounds_of(reference: &Vectors) -> Bounds {
 
 /// Rigid motions (two translations, one turn) that what is held of these particles leaves.
 fn free_motions(members: &[HeldPlace]) -> usize {
-    let centre = members.iter().fold([0.0; 2], |[x, y], (p, _)| {
-        [x + p[0] / members.len() as f64, y + p[1] / members.len() as f64]
-    });
+    let centre = members
+        .iter()
+        .fold([0.0; 2], |[x, y], (p, _)| [x + p[0] / members.len() as f64, y + p[1] / members.len() as f64]);
     let from = |p: Point| [0, 1].map(|k| p[k] - centre[k]);
     let size = members.iter().map(|&(p, _)| from(p)[0].hypot(from(p)[1])).fold(f64::MIN_POSITIVE, f64::max);
     let rows = members.iter().flat_map(|&(p, held)| {
@@ -283,11 +283,7 @@ impl Linkage {
 
     /// Looks for motions of the parts that keep every pin together and every grounded place of a part
     /// where it is, other than a motion of the whole, and names the pin that turns most.
-    fn require_no_turning(
-        &self,
-        (low, high): Bounds,
-        grounded: &[(Point, usize)],
-    ) -> Result<(), Mechanism> {
+    fn require_no_turning(&self, (low, high): Bounds, grounded: &[(Point, usize)]) -> Result<(), Mechanism> {
         if self.parts() > MOST_PARTS {
             return Err(Mechanism::Hinge { particle: self.hinges[0].particle + 1 });
         }
