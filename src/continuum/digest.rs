@@ -1,9 +1,11 @@
 //! Whether two plans, or two files, are the same.
 
+use std::ops::Range;
+
 use super::plan::Plan;
 use crate::engine::setup::{Conduct, RoleChange, Setup};
 use crate::flock::action::ActionKind;
-use crate::flock::law::Weights;
+use crate::flock::law::{MatrixWeights, Weights};
 use crate::flock::motion::Motion;
 use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
@@ -58,10 +60,12 @@ fn digest_of(plan: &Plan, team: Option<&Team>) -> u64 {
     let seen = |index: u32| (first + index as usize) as u32;
     let index = &flock.neighbours.index[bonds.clone()];
     each(&mut digest, &|digest| index.iter().for_each(|&index| digest.bytes(&seen(index).to_le_bytes())));
-    match &flock.weights {
-        Weights::Scalar(weights) => each(&mut digest, &|digest| digest.numbers(&weights[bonds.clone()])),
-        weights => digest.weights(weights),
-    }
+    let weights = |digest: &mut Fnv, weights: &Weights| match weights {
+        Weights::Equal => {}
+        Weights::Scalar(weights) => each(digest, &|digest| digest.numbers(&weights[bonds.clone()])),
+        Weights::Matrix(weights) => each(digest, &|digest| digest.matrices(weights, owned.clone())),
+    };
+    weights(&mut digest, &flock.weights);
     for component in flock.forces.iter().chain(&flock.rest).flat_map(|points| [&points.x, &points.y]) {
         each(&mut digest, &|digest| digest.numbers(&component[owned.clone()]));
     }
@@ -95,7 +99,7 @@ fn digest_of(plan: &Plan, team: Option<&Team>) -> u64 {
             ActionKind::Follow(conduct) => {
                 let Conduct { rule, fracture, update, forces, rest, .. } = &**conduct;
                 digest.text(&format!("{rule:?} {fracture:?} {update:?}"));
-                digest.weights(&conduct.weights);
+                weights(&mut digest, &conduct.weights);
                 forces.iter().chain(rest).for_each(|points| digest.points(points));
             }
         }
@@ -117,15 +121,16 @@ impl Default for Fnv {
 }
 
 impl Fnv {
-    fn weights(&mut self, weights: &Weights) {
-        match weights {
-            Weights::Equal => {}
-            Weights::Scalar(weights) => self.numbers(weights),
-            Weights::Matrix(weights) => {
-                weights.class.iter().for_each(|class| self.bytes(&class.to_le_bytes()));
-                weights.blocks.iter().flatten().for_each(|row| self.numbers(row));
-            }
-        }
+    /// Of each of these particles what its class has: parts of a body number the classes each in its own way.
+    fn matrices(&mut self, weights: &MatrixWeights, of: Range<usize>) {
+        let hash = |ends: &[u32]| {
+            let mut row = Fnv::default();
+            let blocks = &weights.blocks[ends[0] as usize..ends[1] as usize];
+            blocks.iter().flatten().for_each(|numbers| row.numbers(numbers));
+            row.0
+        };
+        let classes: Vec<u64> = weights.starts.windows(2).map(hash).collect();
+        weights.class[of].iter().for_each(|&class| self.bytes(&classes[class as usize].to_le_bytes()));
     }
 
     fn bytes(&mut self, bytes: &[u8]) {

@@ -171,8 +171,8 @@ pub(super) fn recovered(
 ) -> Vec<(usize, StressState)> {
     let (Some(edge), Some(cells)) = (engine.free_edge(), engine.cells()) else { return Vec::new() };
     let (patches, factor) = (Patches::new(edge, engine.body(), cells), engine.load_factor());
-    let turns: Option<Vec<f64>> =
-        (rotation == Rotation::Corotated).then(|| stress::turns(cells, displacement).collect());
+    let turns: Option<Vec<f64>> = (rotation == Rotation::Corotated)
+        .then(|| stress::turns(cells, 0..cells.count(), displacement).collect());
     let turn = |cell: u32| turns.as_ref().map_or(0.0, |turns| turns[cell as usize]);
     let fields: Vec<Fields> = std::iter::once(elastic).chain(&cells.inclusions).map(Fields::of).collect();
     let recover = |&i: &usize| {

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashSet};
 
 use crate::engine::setup::RoleChange;
-use crate::flock::body::{Body, BodyError, Cut};
+use crate::flock::body::{Body, BodyError, Cut, Outlay};
 use crate::flock::lattice::Site;
 use crate::flock::motion::Motion;
 use crate::flock::neighbourhood::{Neighbourhood, NeighbourhoodError, Neighbours};
@@ -15,7 +15,7 @@ use crate::geometry::locate::Finder;
 use crate::geometry::outline::{Outline, OutlineError, Place};
 use crate::geometry::partition::{Partition, PartitionError};
 use crate::geometry::portion::{Portion, Selection};
-use crate::material::cells::{Cells, neighbourhood, neighbourhood_of, without_loose_sites};
+use crate::material::cells::{Cells, neighbourhood, neighbourhood_of, templates};
 use crate::material::fit::{FitError, Fitted, Part, fit_regions};
 use crate::material::outline_loads::{self, Loader, OutlineLoad, Push};
 use crate::scene::{BodySource, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion};
@@ -60,7 +60,10 @@ impl Layout {
                 let partition = Some(partition).filter(|_| !scene.inclusions.is_empty());
                 Self { body, neighbours, cells: Some(cells), outline, partition }
             }
-            of_lattice => Self::of_whole_cells(scene, of_lattice)?,
+            of_lattice => {
+                let body = body_of(scene).map_err(|error| refuse_body(scene, &error))?;
+                Self::of_whole_cells(scene, body, of_lattice)?
+            }
         };
         if !matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. }) {
             let connected = layout.body.require_connected(&layout.neighbours);
@@ -69,40 +72,23 @@ impl Layout {
         Ok(layout)
     }
 
-    /// A part of a body of particles alone, which stand on a lattice.
+    /// A part of a body of whole cells, or of particles alone, which stand on a lattice.
     ///
     /// # Errors
-    /// Coordinates that doubles cannot resolve.
+    /// As [`Layout::new`].
     pub(super) fn of_part(scene: &Scene, body: Body, neighbours: Neighbours) -> Result<Self, SceneError> {
         require_in_range(scene)?;
-        require_resolved(scene, &body)?;
-        let outline = match &scene.body {
-            BodySource::Cut(Cut::Shape(shape)) => Outline::of_shape(shape).ok(),
-            _ => None,
-        };
-        Ok(Self { body, neighbours, cells: None, outline, partition: None })
+        Self::of_whole_cells(scene, (body, neighbours), None)
     }
 
     /// A body of whole cells, or of particles alone; one that fits its outline as it is keeps that.
-    fn of_whole_cells(scene: &Scene, fitted: Option<(Fitted, Partition)>) -> Result<Self, SceneError> {
-        let (body, neighbours) = body_of(scene).map_err(|error| refuse_body(scene, &error))?;
+    fn of_whole_cells(
+        scene: &Scene,
+        (mut body, neighbours): (Body, Neighbours),
+        fitted: Option<(Fitted, Partition)>,
+    ) -> Result<Self, SceneError> {
         require_resolved(scene, &body)?;
-        let (mut body, neighbours, mut cells) = match scene.mean {
-            Mean::Material { .. } => {
-                // Sites in no cell carry nothing; they stick out of a curved edge.
-                let (body, neighbours, cells) = without_loose_sites(&body, &neighbours);
-                if body.count() == 0 {
-                    let message = "the body has no cell of the lattice, so there is no material";
-                    let help = "use a smaller spacing or a larger shape";
-                    return Err(scene.refuse("body.shape", message, help));
-                }
-                (body, neighbours, Some(cells))
-            }
-            _ => {
-                let cells = scene.material.as_ref().map(|_| Cells::of_body(&body));
-                (body, neighbours, cells)
-            }
-        };
+        let mut cells = scene.material.as_ref().map(|_| Cells::of_body(&body));
         let (outline, partition) = match (&scene.body, &cells, fitted) {
             (_, _, Some((fitted, partition))) if fitted.body.sites == body.sites => {
                 body.outline = fitted.body.outline;
@@ -387,12 +373,20 @@ impl Layout {
 
 fn body_of(scene: &Scene) -> Result<(Body, Neighbours), BodyError> {
     match (&scene.body, &scene.neighbourhood) {
-        (BodySource::Cut(cut), neighbourhood) => {
-            Body::build(scene.lattice.clone(), cut, neighbourhood, scene.frame)
-        }
+        (BodySource::Cut(cut), _) => outlay_of(scene, cut).lay_out(None),
         (BodySource::Points(cloud), Neighbourhood::Within { radius }) => Body::of_cloud(cloud, Some(*radius)),
         (BodySource::Points(cloud), _) => Body::of_cloud(cloud, None),
     }
+}
+
+/// The things that the body is laid out from; where the rule is a material sites in no cell, which carry nothing, are none.
+pub(super) fn outlay_of<'a>(scene: &'a Scene, cut: &'a Cut) -> Outlay<'a> {
+    let Scene { lattice, neighbourhood, frame, .. } = scene;
+    let cells = match scene.mean {
+        Mean::Material { .. } => templates(lattice),
+        _ => Vec::new(),
+    };
+    Outlay { lattice, cut, neighbourhood, frame: *frame, cells }
 }
 
 /// Displacement \[length\] of each particle that does not follow, at `step`; `None` for followers and for leaders

@@ -10,7 +10,7 @@ use crate::flock::rules::{Mean, Rotation};
 use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
-use crate::material::stress::{self, StressState};
+use crate::material::stress::{self, Over, StressState};
 
 /// Part of the strain energy by which the work done on the way may differ from it.
 const MISSED_WORK: f64 = 0.05;
@@ -112,12 +112,30 @@ impl Stresses {
 
     /// At the engine's present places.
     pub fn at_present(engine: &Engine, elastic: &Elastic) -> Option<Self> {
-        let broken: Vec<[u32; 2]> = engine.breaks().iter().map(|one| one.pair).collect();
-        Self::of(engine, elastic, &engine.displacements(), &broken)
+        let here = |index: u32| Some(engine.body().exact_particle(index as usize)? as u32);
+        let pairs = engine.breaks().iter().filter_map(|one| Some([here(one.pair[0])?, here(one.pair[1])?]));
+        Self::of(engine, elastic, &engine.displacements(), &pairs.collect::<Vec<_>>())
     }
 
+    /// Of the whole body, if each part knows its own: the first of several.
     fn peak(&self, engine: &Engine, cells: &Cells) -> Option<Peak> {
-        let finite = self.cells.iter().enumerate().filter(|(_, stress)| stress.von_mises.is_finite());
+        let own = self.own_peak(engine, cells);
+        let Some(team) = engine.parted() else { return own };
+        let counts = team.each([engine.owned_cells().len() as u64]);
+        let before = counts.into_iter().take(team.rank()).map(|[count]| count as usize).sum::<usize>();
+        let number = |mut peak: Peak| {
+            peak.cell = peak.cell.map(|cell| before + cell - engine.owned_cells().start);
+            peak
+        };
+        let bytes = postcard::to_stdvec(&own.map(number)).unwrap_or_default();
+        let all = team.each_bytes(&bytes).into_iter();
+        let all = all.filter_map(|bytes| postcard::from_bytes::<Option<Peak>>(&bytes).ok().flatten());
+        all.reduce(|best, next| if next.von_mises > best.von_mises { next } else { best })
+    }
+
+    fn own_peak(&self, engine: &Engine, cells: &Cells) -> Option<Peak> {
+        let own = engine.owned_cells().map(|cell| (cell, &self.cells[cell]));
+        let finite = own.filter(|(_, stress)| stress.von_mises.is_finite());
         // The first of several.
         let higher = |best: Option<(usize, f64)>, (cell, stress): (usize, &StressState)| match best {
             Some((_, most)) if most >= stress.von_mises => best,
@@ -162,22 +180,25 @@ impl Mechanics {
         let cells = engine.cells()?;
         let forces = Forces::of(engine);
         let u = engine.displacements();
-        let finite =
-            |values: &mut dyn Iterator<Item = f64>| values.filter(|v| v.is_finite()).fold(0.0, f64::max);
+        let own = engine.owned_cells();
+        let finite = |values: &mut dyn Iterator<Item = f64>| {
+            let [largest] = engine.largest_of_parts([values.filter(|v| v.is_finite()).fold(0.0, f64::max)]);
+            largest
+        };
         Some(Self {
             loads: forces.as_ref().map_or_else(Vec::new, |forces| forces.each_load(engine)),
             load: forces.as_ref().and_then(|forces| forces.load(engine)),
             reactions: forces.as_ref().map_or_else(Vec::new, |forces| forces.reactions(engine)),
             strain_energy: strain_energy(engine, elastic, forces.as_ref(), &u),
             work: forces.as_ref().map(|forces| Work {
-                loads: forces.work_of_loads(),
-                supports: forces.work_of_supports(engine),
+                loads: forces.work_of(&forces.loads, engine),
+                supports: forces.work_of(&forces.supports(engine), engine),
             }),
             work_done: engine.path().map(Path::done),
             unbalanced: forces.as_ref().map(|forces| forces.largest_left(engine)),
             largest_von_mises: stresses.peak(engine, cells),
-            largest_strain: finite(&mut stresses.cells.iter().map(StressState::largest_strain)),
-            largest_turn: finite(&mut stress::turns(cells, &u).map(f64::abs)),
+            largest_strain: finite(&mut stresses.cells[own.clone()].iter().map(StressState::largest_strain)),
+            largest_turn: finite(&mut stress::turns(cells, own, &u).map(f64::abs)),
         })
     }
 
@@ -220,11 +241,14 @@ impl Mechanics {
 /// By the rule's own forces under small rotations, else from the cells.
 fn strain_energy(engine: &Engine, elastic: &Elastic, forces: Option<&Forces>, u: &Vectors) -> f64 {
     if let (Some(forces), Rotation::Small) = (forces, rotation(engine)) {
-        let work = forces.internal.iter().zip(u.iter()).map(|(f, u)| f[0] * u[0] + f[1] * u[1]);
         // Without the sign of a zero.
-        return 0.0 - 0.5 * work.sum::<f64>();
+        return 0.0 - 0.5 * forces.work_of(&forces.internal, engine);
     }
-    let of_cells = engine.cells().map(|cells| stress::strain_energy(cells, elastic, u, rotation(engine)));
+    let sum = |own: &mut dyn Iterator<Item = f64>| engine.sum_of_parts([-0.0], own.map(|own| [own]))[0];
+    let over = Over { cells: engine.owned_cells(), particles: engine.body().owned(), sum: &sum };
+    let rotation = rotation(engine);
+    let of_cells =
+        engine.cells().map(|cells| stress::strain_energy_over(cells, elastic, (u, rotation), &over));
     of_cells.and_then(Result::ok).unwrap_or(f64::NAN)
 }
 

@@ -18,6 +18,7 @@ pub mod looks;
 pub mod mechanics;
 pub mod memory;
 pub mod parts;
+mod pieces;
 pub mod places;
 pub mod plan;
 pub mod record;

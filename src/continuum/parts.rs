@@ -6,14 +6,11 @@
 //! neighbours: what it has is a body like any other. The checks that need the whole are made together, and what one rank
 //! refuses all refuse.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use super::layout::{Layout, refuse_body};
-use crate::flock::body::{Body, BodyError, Census, Extent, Outlay, Part, empty};
-use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
-use crate::flock::rules::Mean;
-use crate::geometry::disjoint_sets::DisjointSets;
+use super::layout::{Layout, outlay_of, refuse_body};
+use crate::flock::body::{Census, Extent, Outlay, Part};
+use crate::flock::neighbourhood::Neighbourhood;
 use crate::ranks::Team;
 use crate::scene::{BodySource, LeaderMotion, RoleEntry, Scene, SceneError, Weights};
 use crate::sweep::Order;
@@ -24,17 +21,16 @@ use crate::sweep::rows::usual_band;
 /// The key for which a scene has to be laid out as a whole, on every rank; `None` where each can lay out its part.
 pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
     let weights = matches!(scene.weights, Some(Weights::Solved | Weights::Gradient { .. }));
-    let keys: [(bool, &str); 11] = [
+    let keys: [(bool, &str); 10] = [
         (!matches!(scene.body, BodySource::Cut(_)), "body.shape"),
         (scene.is_fitted, "body.outline"),
         (matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. }), "neighbours.kind"),
-        (scene.material.is_some(), "material"),
-        (matches!(scene.mean, Mean::Material { .. }), "rule.mean"),
         (weights, "rule.weights"),
         (scene.update.order == Order::Sequential, "update.order"),
         (scene.equilibrium.is_some(), "equilibrium"),
         (scene.load_steps.is_some(), "load_steps"),
         (!scene.loads.is_empty(), "loads"),
+        (!scene.record.places.is_empty(), "record.places"),
         (scene.actions.iter().any(|action| !action.is_cut()), "actions"),
     ];
     let of_role = |(k, entry): (usize, &RoleEntry)| {
@@ -57,6 +53,8 @@ pub struct Parting {
     extent: Extent,
     /// Columns around a particle that decide on it.
     reach: i32,
+    /// Columns around those of a part, beyond its reach, that decide on which cells it has.
+    margin: i32,
     /// Where the parts begin, and where the last one ends: numbers of columns, shape \[ranks + 1\].
     cuts: Vec<usize>,
     /// Particles of a halo on either side.
@@ -104,9 +102,11 @@ impl Parting {
     ) -> Result<Self, SceneError> {
         let outlay = outlay(scene)?;
         if extent.bounds.0[0] > extent.bounds.1[0] {
-            return Err(refuse_body(scene, &empty(outlay.lattice, outlay.cut)));
+            return Err(refuse_body(scene, &outlay.empty()));
         }
         let reach = outlay.reach().map_err(|error| refuse_body(scene, &error))?;
+        // A cell's neighbours say over which others it averages its dilatation.
+        let margin = 2 * outlay.cell_width();
         let cuts = cuts(counts.iter().map(|&count| count as usize), ranks);
         let mut before = vec![0];
         before.extend(counts.iter().scan(0, |sum, count| {
@@ -120,7 +120,7 @@ impl Parting {
         let sizes = cuts.windows(2).map(|ends| before[ends[1]] - before[ends[0]]);
         let least = sizes.filter(|&size| size > 0).min().unwrap_or(0);
         let halo = (steps_of((least / band) as usize) as u64 + 1) * band;
-        Ok(Self { columns, before, extent, reach, cuts, halo })
+        Ok(Self { columns, before, extent, reach, margin, cuts, halo })
     }
 
     /// Particles of each rank, shape \[ranks\].
@@ -152,7 +152,7 @@ impl Parting {
     fn exact(&self, rank: usize) -> Range<usize> {
         let Range { start, end } = self.owned(rank);
         let (from, to) = (self.before[start].saturating_sub(self.halo), self.before[end] + self.halo);
-        let least = 4 * self.reach as usize;
+        let least = (4 * self.reach + self.margin) as usize;
         let low = self.before.partition_point(|&before| before < from).min(start.saturating_sub(least));
         let high = self.before.partition_point(|&before| before < to).max(end + least);
         low..high.min(self.columns.len())
@@ -160,7 +160,7 @@ impl Parting {
 
     /// The same with those that their neighbours stand in.
     fn window(&self, exact: &Range<usize>) -> Range<usize> {
-        let reach = self.reach as usize;
+        let reach = (self.reach + self.margin) as usize;
         exact.start.saturating_sub(reach)..(exact.end + reach).min(self.columns.len())
     }
 
@@ -188,10 +188,10 @@ impl Parting {
 }
 
 fn outlay(scene: &Scene) -> Result<Outlay<'_>, SceneError> {
-    let BodySource::Cut(cut) = &scene.body else {
-        return Err(scene.refuse("body.shape", "points are no columns", "run it as a whole"));
-    };
-    Ok(Outlay { lattice: &scene.lattice, cut, neighbourhood: &scene.neighbourhood, frame: scene.frame })
+    match &scene.body {
+        BodySource::Cut(cut) => Ok(outlay_of(scene, cut)),
+        _ => Err(scene.refuse("body.shape", "points are no columns", "run it as a whole")),
+    }
 }
 
 fn columns_of(scene: &Scene) -> Result<Range<i32>, SceneError> {
@@ -235,73 +235,13 @@ pub fn agreed<T>(scene: &Scene, team: &Team, own: Result<T, SceneError>) -> Resu
     let first = all.iter().find(|words| !words.is_empty());
     match (own, first) {
         (Ok(own), None) => Ok(own),
-        (own, Some(words)) => {
-            let text = String::from_utf8_lossy(words);
+        (own, Some(first)) => {
+            let text = String::from_utf8_lossy(first);
             let mut parts = text.split('\0');
             let [key, message, help] = std::array::from_fn(|_| parts.next().unwrap_or_default());
-            Err(own.err().unwrap_or_else(|| scene.refuse(key, message, help)))
+            let own = own.err().filter(|_| words == *first);
+            Err(own.unwrap_or_else(|| scene.refuse(key, message, help)))
         }
         (Err(own), None) => Err(own),
-    }
-}
-
-/// Refuses a body that is in pieces, as [`Body::require_connected`] does; for all ranks together.
-///
-/// # Errors
-/// On all ranks alike.
-pub fn require_connected(body: &Body, neighbours: &Neighbours, team: &Team) -> Result<(), BodyError> {
-    let Some(Part { first, owned, exact, .. }) = &body.part else {
-        return body.require_connected(neighbours);
-    };
-    let mut sets = DisjointSets::new(body.count());
-    for i in exact.clone() {
-        let seen = neighbours.of(i).iter().filter(|&&k| !body.is_frame[k as usize]);
-        seen.filter(|&&k| exact.contains(&(k as usize))).for_each(|&k| sets.join(i as u32, k));
-    }
-    let labels = sets.labels();
-    let rank = team.rank() as u64;
-    // Those just beyond the end of this part, by which bonds lead to others: as far as the last of its own see.
-    let sees = |i: usize| neighbours.of(i).iter().map(|&k| k as usize).max().unwrap_or(i);
-    let end = owned.clone().map(sees).max().map_or(owned.end, |last| (last + 1).clamp(owned.end, exact.end));
-    let beyond = (owned.end..end).filter(|&i| !body.is_frame[i]);
-    let labelled: Vec<u64> = beyond.flat_map(|i| [(first + i) as u64, rank, u64::from(labels[i])]).collect();
-    let all = team.gather_all(&labelled);
-    let here = |id: u64| (id as usize).checked_sub(*first).filter(|i| owned.contains(i));
-    let pairs: BTreeSet<[u64; 4]> = all
-        .chunks_exact(3)
-        .filter_map(|of| Some([of[1], of[2], rank, u64::from(labels[here(of[0])?])]))
-        .collect();
-    let pairs = team.gather_all(&pairs.into_iter().flatten().collect::<Vec<_>>());
-    // The first particle of each piece of this part.
-    let mut pieces: BTreeMap<u32, u64> = BTreeMap::new();
-    for i in owned.clone().filter(|&i| !body.is_frame[i]) {
-        pieces.entry(labels[i]).or_insert((first + i) as u64);
-    }
-    let own: Vec<u64> = pieces.into_iter().flat_map(|(label, id)| [rank, u64::from(label), id]).collect();
-    let pieces = team.gather_all(&own);
-    let numbers: BTreeMap<[u64; 2], u32> = {
-        let nodes = pieces.chunks_exact(3).map(|of| [of[0], of[1]]);
-        let ends = pairs.chunks_exact(2).map(|of| [of[0], of[1]]);
-        nodes.chain(ends).collect::<BTreeSet<_>>().into_iter().zip(0..).collect()
-    };
-    let mut sets = DisjointSets::new(numbers.len());
-    for pair in pairs.chunks_exact(4) {
-        sets.join(numbers[&[pair[0], pair[1]]], numbers[&[pair[2], pair[3]]]);
-    }
-    let labels = sets.labels();
-    let mut firsts: BTreeMap<u32, u64> = BTreeMap::new();
-    for of in pieces.chunks_exact(3) {
-        let label = labels[numbers[&[of[0], of[1]]] as usize];
-        let known = firsts.entry(label).or_insert(of[2]);
-        *known = of[2].min(*known);
-    }
-    let mut ids: Vec<u64> = firsts.into_values().collect();
-    ids.sort_unstable();
-    match ids[..] {
-        [first, second, ..] => {
-            let [first, second] = [first, second].map(|index| index as usize + 1);
-            Err(BodyError::Disconnected { parts: ids.len(), first, second })
-        }
-        _ => Ok(()),
     }
 }

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use super::damping::along_outline;
 use super::layout::{Layout, ReferenceMotion, held_components, no_particle, refuse_pieces};
-use super::parts::{Parting, agreed, require_connected};
+use super::parts::{Parting, agreed};
+use super::pieces::{linkage, require_connected};
 use super::{places, weights};
 use crate::engine::probes::ProbeSeries;
 use crate::engine::setup::{Conduct, RoleChange, Setup, of_first_roles};
@@ -22,6 +23,7 @@ use crate::geometry::outline::Outline;
 use crate::material::free_edge::FreeEdge;
 use crate::material::mechanism::require_held;
 use crate::material::outline_loads::{Load, Resultant, sum};
+use crate::material::weights::WeightsError;
 use crate::ranks::Team;
 use crate::scene::{LoadSteps, Scene, SceneError, Stop};
 use crate::solve::linear::HeldComponent;
@@ -90,6 +92,7 @@ impl Plan {
             }
         }
         let mut plan = agreed(scene, team, Self::of_roles(scene, layout, changes))?;
+        plan.require_held_together(scene, team)?;
         if plan.setup.flock.bonds.is_some() && u32::try_from(plan.setup.body.total()).is_err() {
             let message = "broken bonds are known by particles up to number 4,294,967,295";
             return Err(scene.refuse("body.shape", message, "use a wider spacing or a smaller shape"));
@@ -99,6 +102,16 @@ impl Plan {
         });
         plan.agree_on_rest(team);
         Ok(plan)
+    }
+
+    /// Refuses a material whose cells can move against each other.
+    fn require_held_together(&self, scene: &Scene, team: &Team) -> Result<(), SceneError> {
+        let Setup { body, cells, .. } = &self.setup;
+        let (Some(cells), Mean::Material { .. }) = (cells, scene.mean) else { return Ok(()) };
+        let incidence = cells.incidence(body.count());
+        let (_, linkage) = linkage(body, (cells, &incidence), team);
+        let rigid = linkage.require_rigid(body.bounds());
+        rigid.map_err(|mechanism| weights::refuse(scene, &WeightsError::Mechanism(mechanism)))
     }
 
     /// Keeps rest offsets if any particle of the body needs one: those that stand at the ends of a part alone do.

@@ -73,17 +73,22 @@ fn of_material(
         true => material.corotated_weights(),
         false => material.weights(),
     };
-    material.map(|material| Weights::Matrix(weights(material))).map_err(|error| {
-        let (key, help) = match &error {
-            WeightsError::MissingNeighbour { .. } | WeightsError::MissingMate { .. } => (
-                "neighbours",
-                "use kind = \"cells\", or leave the neighbours out: the rule takes those that it needs",
-            ),
-            WeightsError::Mechanism(_) => ("body.shape", "use a smaller spacing or a larger shape"),
-            _ => ("material", "use constants and a lattice less far apart"),
-        };
-        scene.refuse(key, error.to_string(), help)
+    material.map(|material| Weights::Matrix(weights(material))).map_err(|error| match &body.part {
+        Some(part) => refuse(scene, &error.in_whole(part.first, part.whole.neighbours)),
+        None => refuse(scene, &error),
     })
+}
+
+pub(super) fn refuse(scene: &Scene, error: &WeightsError) -> SceneError {
+    let (key, help) = match error {
+        WeightsError::MissingNeighbour { .. } | WeightsError::MissingMate { .. } => (
+            "neighbours",
+            "use kind = \"cells\", or leave the neighbours out: the rule takes those that it needs",
+        ),
+        WeightsError::Mechanism(_) => ("body.shape", "use a smaller spacing or a larger shape"),
+        _ => ("material", "use constants and a lattice less far apart"),
+    };
+    scene.refuse(key, error.to_string(), help)
 }
 
 /// Weights follow the offsets; a particle that lacks a neighbour lacks its weight.

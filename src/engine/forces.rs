@@ -93,28 +93,37 @@ impl Forces {
 
     /// Reactions of the entries of `roles` that hold particles at present, in their order.
     pub fn reactions(&self, engine: &Engine) -> Vec<Reaction> {
-        let entries = held(engine).into_iter().enumerate().filter(|(_, held)| !held.is_empty());
-        entries.map(|(k, held)| self.reaction_of(engine, k, &held)).collect()
+        let owned = engine.body().owned();
+        let own = |held: Vec<Held>| held.into_iter().filter(|one| owned.contains(&one.particle)).collect();
+        let entries = held(engine).into_iter().map(own).enumerate();
+        entries.filter_map(|(k, held): (usize, Vec<Held>)| self.reaction_of(engine, k, &held)).collect()
     }
 
-    fn reaction_of(&self, engine: &Engine, entry: usize, held: &[Held]) -> Reaction {
-        let mean =
-            |points: &Vectors| held.iter().map(|one| points.get(one.particle)).collect::<Vectors>().middle();
+    /// `None` where no part of the body has a particle that the entry holds; `held` are those of this one.
+    fn reaction_of(&self, engine: &Engine, entry: usize, held: &[Held]) -> Option<Reaction> {
+        let particles = engine.count_of_parts(held.len());
+        let sum =
+            |of: &dyn Fn(Held) -> [f64; 2]| engine.sum_of_parts([0.0; 2], held.iter().map(|&one| of(one)));
+        let mean = |points: &Vectors| sum(&|one| points.get(one.particle)).map(|s| s / particles as f64);
+        if particles == 0 {
+            return None;
+        }
         let centre = mean(&self.places);
-        let moment = |about: [f64; 2]| {
-            let of = |one: &Held| cross(minus(self.places.get(one.particle), about), self.held_by(*one));
-            held.iter().map(of).sum::<f64>()
-        };
-        Reaction {
+        let moments = held.iter().map(|&one| {
+            let of = |about| cross(minus(self.places.get(one.particle), about), self.held_by(one));
+            [of(centre), of([0.0; 2])]
+        });
+        let [moment, moment_about_origin] = engine.sum_of_parts([-0.0; 2], moments);
+        Some(Reaction {
             key: format!("roles[{entry}]"),
             role: engine.changes()[entry].role.name().to_owned(),
-            particles: held.len(),
+            particles,
             centre,
             displacement: mean(&self.displacement),
-            force: held.iter().fold([0.0; 2], |sum, &one| plus(sum, self.held_by(one))),
-            moment: moment(centre),
-            moment_about_origin: moment([0.0; 2]),
-        }
+            force: sum(&|one| self.held_by(one)),
+            moment,
+            moment_about_origin,
+        })
     }
 
     /// The reaction along the components that are held.
@@ -136,23 +145,24 @@ impl Forces {
     /// Of the part of a load that is on the body.
     fn resultant(&self, engine: &Engine, whole: &Vectors) -> LoadResultant {
         let factor = engine.load_factor();
-        let [x, y] = whole.iter().fold([0.0; 2], plus);
-        let moments = self.places.iter().zip(whole.iter()).map(|(at, force)| cross(at, force));
-        let (size, most) = (f64::hypot(x, y), whole.iter().map(|[x, y]| f64::hypot(x, y)).sum::<f64>());
+        let of = |i: usize| {
+            let force = whole.get(i);
+            let work = dot(force, self.displacement.get(i));
+            [force[0], force[1], cross(self.places.get(i), force), f64::hypot(force[0], force[1]), work]
+        };
+        let start = [0.0, 0.0, -0.0, -0.0, -0.0];
+        let [x, y, moment, most, work] = engine.sum_of_parts(start, engine.body().owned().map(of));
+        let size = f64::hypot(x, y);
         // Forces that cancel leave rounding.
-        let displacement = (size > 1e-9 * most).then(|| work(whole, &self.displacement) / size);
-        let force = [factor * x, factor * y];
-        LoadResultant { force, moment_about_origin: factor * moments.sum::<f64>(), displacement }
+        let displacement = (size > 1e-9 * most).then(|| work / size);
+        LoadResultant { force: [factor * x, factor * y], moment_about_origin: factor * moment, displacement }
     }
 
-    /// The loads, as they are now, times the displacements \[force length\].
-    pub fn work_of_loads(&self) -> f64 {
-        work(&self.loads, &self.displacement)
-    }
-
-    /// The reactions, as they are now, times the displacements \[force length\].
-    pub fn work_of_supports(&self, engine: &Engine) -> f64 {
-        work(&self.supports(engine), &self.displacement)
+    /// Forces times the displacements \[force length\].
+    pub fn work_of(&self, forces: &Vectors, engine: &Engine) -> f64 {
+        let work = |i: usize| [dot(forces.get(i), self.displacement.get(i))];
+        let [work] = engine.sum_of_parts([-0.0], engine.body().owned().map(work));
+        work
     }
 
     /// The reaction on each particle along what is held of it \[force\], shape \[count\].
@@ -176,13 +186,10 @@ impl Forces {
             let [x, y] = [0, 1].map(|axis| if free[i][axis] { left[axis] } else { 0.0 });
             f64::hypot(x, y)
         };
-        let followers = (0..free.len()).filter(|&i| engine.roles()[i] == Role::Follower);
-        followers.map(left).fold(0.0, f64::max)
+        let followers = engine.body().owned().filter(|&i| engine.roles()[i] == Role::Follower);
+        let [largest] = engine.largest_of_parts([followers.map(left).fold(0.0, f64::max)]);
+        largest
     }
-}
-
-fn work(forces: &Vectors, displacement: &Vectors) -> f64 {
-    forces.iter().zip(displacement.iter()).map(|(force, by)| dot(force, by)).sum()
 }
 
 /// A particle that is held along these axes.

@@ -20,6 +20,7 @@ use crate::flock::body::{Body, Part};
 use crate::flock::fracture::{Bonds, Break};
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::vectors::{Vectors, distance};
+use crate::material::cells::Cells;
 use crate::ranks::Team;
 use crate::sweep::caches::Caches;
 use crate::sweep::domain::{Domain, Halo, Held, Needs, Share};
@@ -131,16 +132,40 @@ impl Engine {
 
     /// The sum of each of some numbers of particles over those of the whole body that belong to it, in order of index.
     pub(super) fn sum_of_particles<const N: usize>(&self, of: impl Fn(usize) -> [f64; N]) -> [f64; N] {
+        self.sum_of_parts([-0.0; N], self.body.owned().filter(|&i| self.roles[i].is_body()).map(of))
+    }
+
+    /// What `start` and the numbers of this part, which are its `own`, and those of the others add up to, in the order of the parts.
+    pub fn sum_of_parts<const N: usize>(
+        &self,
+        start: [f64; N],
+        own: impl Iterator<Item = [f64; N]>,
+    ) -> [f64; N] {
         let add = |sums: [u64; N]| {
-            let add = |sums: [f64; N], i: usize| {
-                let own = of(i);
-                std::array::from_fn(|k| sums[k] + own[k])
-            };
-            let body = self.body.owned().filter(|&i| self.roles[i].is_body());
-            body.fold(sums.map(f64::from_bits), add).map(f64::to_bits)
+            let add = |sums: [f64; N], own: [f64; N]| std::array::from_fn(|k| sums[k] + own[k]);
+            own.fold(sums.map(f64::from_bits), add).map(f64::to_bits)
         };
-        let start = [(-0.0f64).to_bits(); N];
-        self.parted().map_or_else(|| add(start), |team| team.chain(start, add)).map(f64::from_bits)
+        let start = start.map(f64::to_bits);
+        match self.parted() {
+            Some(team) => team.chain(start, add),
+            None => add(start),
+        }
+        .map(f64::from_bits)
+    }
+
+    /// How many there are in all parts.
+    pub fn count_of_parts(&self, own: usize) -> usize {
+        self.parted().map_or(own, |team| team.sum([own as u64])[0] as usize)
+    }
+
+    /// The cells that belong to this part of the body, as their first corners do; all of a whole one.
+    pub fn owned_cells(&self) -> Range<usize> {
+        let owned = self.body.owned();
+        let of = |cells: &Cells| match self.body.part {
+            Some(_) => cells.before(owned.start)..cells.before(owned.end),
+            None => 0..cells.count(),
+        };
+        self.cells.as_ref().map_or(0..0, of)
     }
 
     /// The id of the first particle whose position is not finite.

@@ -103,9 +103,10 @@ pub fn write_final(
 pub fn write_final_of_parts(
     folder: Option<&OutputFolder>,
     engine: &Engine,
+    stresses: Option<&[Option<StressState>]>,
     team: &Team,
 ) -> Result<(), ExportError> {
-    let rows = || final_rows(engine, None);
+    let rows = || final_rows(engine, stresses);
     let Some(folder) = folder else {
         let mut rows = rows().peekable();
         while rows.peek().is_some() {

@@ -78,7 +78,8 @@ pub fn of_part(plan: &Plan, ranks: usize, program: usize) -> usize {
     const ON_THE_WAY: usize = 2 * 2 * 16;
     let [each, of_rank] = MPI;
     let halo = plan.setup.body.part.as_ref().map_or(0, |part| part.exact.len() - part.owned.len());
-    program + RUNNING + stepped(plan) + each + of_rank * ranks.min(ON_A_MACHINE) + ON_THE_WAY * halo
+    let most = measured(plan).max(ON_THE_WAY * halo);
+    program + RUNNING + stepped(plan) + each + of_rank * ranks.min(ON_A_MACHINE) + most
 }
 
 /// Bytes of what the figures of so many steps are while they are drawn, as many at once as there are threads.

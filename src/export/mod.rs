@@ -218,14 +218,16 @@ pub fn write_all_of_parts(
 ) -> Result<Summary, ExportError> {
     let start = Instant::now();
     let probes = probes_of_parts(&outcome.engine, probes, team);
-    let written = csv::write_final_of_parts(folder, &outcome.engine, team);
+    let (measured, stresses) = Measured::of(scene, outcome).unzip();
+    let of_particles = stresses.as_ref().map(|stresses| &stresses.particles[..]);
+    let written = csv::write_final_of_parts(folder, &outcome.engine, of_particles, team);
     let written = written.and_then(|()| match folder {
         Some(folder) => write_histories(folder, &outcome.engine, &probes).map(drop),
         None => Ok(()),
     });
     timings.output += start.elapsed();
     // Sums over all parts: the others wait for this one even if it could not write.
-    let summary = Summary::new(scene, outcome, None, timings);
+    let summary = Summary::new(scene, outcome, measured, timings);
     written?;
     folder.map_or(Ok(()), |folder| summary.write(folder).map(drop))?;
     Ok(summary)

@@ -324,30 +324,32 @@ struct Grid<'a> {
     vertices: Range<usize>,
     /// Bonds, with their places in the neighbours' index list.
     bonds: Vec<(usize, [u32; 2])>,
-    polygons: Option<&'a Cells>,
+    /// Of a part those that are its own.
+    polygons: Vec<&'a [u32]>,
 }
 
 impl<'a> Grid<'a> {
     fn of(engine: &'a Engine) -> Self {
-        let (flock, polygons) = (engine.flock(), engine.cells());
+        let (flock, owned) = (engine.flock(), engine.body().owned());
+        let of_cells = |cells: &'a Cells| engine.owned_cells().map(|cell| cells.of(cell));
+        let polygons: Vec<&[u32]> = engine.cells().into_iter().flat_map(of_cells).collect();
         // Those of a material lie over one another, and none breaks.
-        if polygons.is_some() && matches!(flock.weights, Weights::Matrix(_)) {
-            return Self { points: 0..engine.present().len(), vertices: 0..0, bonds: Vec::new(), polygons };
-        }
-        let owned = engine.body().owned();
-        let is_own = |(_, [j, _]): &(usize, [u32; 2])| owned.contains(&(*j as usize));
+        let is_material = matches!(flock.weights, Weights::Matrix(_));
+        let is_own = |(_, [j, _]): &(usize, [u32; 2])| !is_material && owned.contains(&(*j as usize));
         let bonds: Vec<_> = bonds::listed_once(&flock.neighbours).filter(is_own).collect();
-        let ends = bonds.iter().flat_map(|(_, pair)| pair).map(|&end| end as usize);
+        let corners = polygons.iter().copied().flatten();
+        let ends = bonds.iter().flat_map(|(_, pair)| pair).chain(corners).map(|&end| end as usize);
         let (low, high) = (ends.clone().min().unwrap_or(owned.start), ends.max().map_or(0, |high| high + 1));
-        Self { points: low.min(owned.start)..high.max(owned.end), vertices: owned, bonds, polygons }
+        let points = low.min(owned.start)..high.max(owned.end);
+        Self { points, vertices: if is_material { 0..0 } else { owned }, bonds, polygons }
     }
 
-    fn polygons(&self) -> impl Iterator<Item = &'a [u32]> + Clone {
-        self.polygons.into_iter().flat_map(Cells::iter)
+    fn polygons(&self) -> impl Iterator<Item = &'a [u32]> + Clone + '_ {
+        self.polygons.iter().copied()
     }
 
     fn count(&self) -> usize {
-        self.vertices.len() + self.bonds.len() + self.polygons.map_or(0, Cells::count)
+        self.vertices.len() + self.bonds.len() + self.polygons.len()
     }
 
     fn write_data(
@@ -362,7 +364,7 @@ impl<'a> Grid<'a> {
         let stretch = |&(_, pair): &(usize, [u32; 2])| {
             length(engine.present(), pair) / length(&engine.body().reference, pair) - 1.0
         };
-        let (cells, polygons) = (self.count(), self.polygons.map_or(0, Cells::count));
+        let (cells, polygons) = (self.count(), self.polygons.len());
         let scalars = if self.bonds.is_empty() && stresses.is_some() { "von_mises" } else { "broken" };
         writeln!(out, "<CellData Scalars=\"{scalars}\">")?;
         let broken = self.bonds.iter().map(|bond| u8::from(is_broken(bond)));
@@ -378,7 +380,7 @@ impl<'a> Grid<'a> {
                 let [a, b] = pair.map(|end| at_particle(stresses, end as usize));
                 std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
             };
-            let own = stresses.cells.iter().map(with_von_mises);
+            let own = stresses.cells[engine.owned_cells()].iter().map(with_von_mises);
             write_stresses(out, cells, particles.chain(self.bonds.iter().map(between)).chain(own))?;
         }
         writeln!(out, "</CellData>")
@@ -390,7 +392,7 @@ impl<'a> Grid<'a> {
         let first = self.points.start as i64;
         let row = |&particle: &u32| row_of[particle as usize] - first;
         let bonds = || self.bonds.iter().flat_map(|(_, pair)| pair);
-        let corners = self.polygons.map_or(0, |cells| cells.index.len());
+        let corners = self.polygons().map(<[u32]>::len).sum::<usize>();
         writeln!(out, "<Cells>")?;
         let vertices = self.vertices.len();
         let own = self.vertices.clone().map(|row| row as i64 - first);

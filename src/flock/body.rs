@@ -43,6 +43,9 @@ pub enum BodyError {
         /// Extent of the shape's bounds along y \[length\].
         height: f64,
     },
+    /// No cell of the lattice has all of its corners inside the shape.
+    #[error("the body has no cell of the lattice, so there is no material")]
+    NoCell,
     /// The bounds hold more sites than a body may have.
     #[error("the body would have more than {limit} lattice sites in its bounds")]
     TooLarge {
@@ -164,7 +167,7 @@ impl Extent {
 }
 
 /// The parts of a scene's body that its particles are laid out from.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Outlay<'a> {
     /// The lattice that the sites belong to.
     pub lattice: &'a Lattice,
@@ -174,6 +177,8 @@ pub struct Outlay<'a> {
     pub neighbourhood: &'a Neighbourhood,
     /// How a frame follows the body, if there is one.
     pub frame: Option<FrameRule>,
+    /// Corners of the cells that belong to a site, from there: sites at the corner of none are left out. Empty where all stand.
+    pub cells: Vec<Vec<Site>>,
 }
 
 /// The particles of some columns, counted.
@@ -215,7 +220,7 @@ impl Body {
         neighbourhood: &Neighbourhood,
         frame: Option<FrameRule>,
     ) -> Result<(Self, Neighbours), BodyError> {
-        Outlay { lattice: &lattice, cut, neighbourhood, frame }.lay_out(None)
+        Outlay { lattice: &lattice, cut, neighbourhood, frame, cells: Vec::new() }.lay_out(None)
     }
 }
 
@@ -238,13 +243,19 @@ impl Outlay<'_> {
         Ok(reach(&self.shell(&self.neighbourhood.offsets(self.lattice)?))[0].max(1))
     }
 
+    /// Grid columns that a cell is wide.
+    pub fn cell_width(&self) -> i32 {
+        let columns = self.cells.iter().flatten().map(|corner| corner[0]);
+        columns.clone().max().unwrap_or(0) - columns.min().unwrap_or(0)
+    }
+
     /// Counts the particles of some columns of the body.
     ///
     /// # Errors
     /// As [`Outlay::columns`], and more columns than can be looked at together.
     pub fn count(&self, columns: Range<i32>) -> Result<Census, BodyError> {
         let offsets = self.neighbourhood.offsets(self.lattice)?;
-        let far = self.reach()?;
+        let far = self.reach()? + self.cell_width();
         let map = self.map(&self.shell(&offsets), Some(columns.start - far..columns.end + far))?;
         let mut census = Census { counts: vec![0; columns.len()], extent: Extent::NONE };
         for cell in (0..map.cells.len()).filter(|&cell| map.cells[cell] != NOTHING) {
@@ -282,10 +293,29 @@ impl Outlay<'_> {
 
     fn map(&self, shell: &[Vec<Site>], columns: Option<Range<i32>>) -> Result<SiteMap, BodyError> {
         let mut map = SiteMap::cut(self.lattice, self.cut, self.margin(shell), columns)?;
+        if !self.cells.is_empty() {
+            map.leave_out_loose(self.lattice, &self.cells);
+        }
         if self.frame.is_some() {
             map.mark_frame(self.lattice, shell);
         }
         Ok(map)
+    }
+
+    /// The error for a body without a particle.
+    pub fn empty(&self) -> BodyError {
+        if !self.cells.is_empty() {
+            return BodyError::NoCell;
+        }
+        let (low, high) = match self.cut {
+            Cut::Shape(shape) => shape.bounds(),
+            Cut::Count { .. } => ([0.0; 2], [0.0; 2]),
+        };
+        BodyError::Empty {
+            spacing: self.lattice.spacing(),
+            width: high[0] - low[0],
+            height: high[1] - low[1],
+        }
     }
 
     /// Lays out the whole body, or what of it stands in some columns, with the neighbours that stand there too.
@@ -293,12 +323,12 @@ impl Outlay<'_> {
     /// # Errors
     /// A whole body without a site, too many sites or neighbours, and a neighbourhood that the lattice does not have.
     pub fn lay_out(&self, columns: Option<Range<i32>>) -> Result<(Body, Neighbours), BodyError> {
-        let Self { lattice, cut, neighbourhood, frame } = *self;
+        let Self { lattice, neighbourhood, frame, .. } = *self;
         let offsets = neighbourhood.offsets(lattice)?;
         let is_whole = columns.is_none();
         let mut map = self.map(&self.shell(&offsets), columns)?;
         if is_whole && !map.cells.contains(&BODY) {
-            return Err(empty(lattice, cut));
+            return Err(self.empty());
         }
         let (sites, is_frame) = map.number();
         let reference: Arc<Vectors> = Arc::new(sites.iter().map(|&site| lattice.position(site)).collect());
@@ -529,6 +559,28 @@ impl SiteMap {
         Ok(map)
     }
 
+    /// Takes out the sites that are at the corner of no whole cell: they stick out of a curved edge, and carry nothing.
+    fn leave_out_loose(&mut self, lattice: &Lattice, cells: &[Vec<Site>]) {
+        let mut is_corner = vec![false; self.cells.len()];
+        let mut corners = Vec::new();
+        for [i, j] in (0..self.cells.len()).map(|cell| self.window.site(cell)) {
+            if !lattice.is_site([i, j]) || lattice.sublattice([i, j]) != 0 {
+                continue;
+            }
+            for cell in cells {
+                let there = |corner: &Site| self.window.number([i + corner[0], j + corner[1]]);
+                let is_in = |number: &usize| self.cells[*number] == BODY;
+                corners.clear();
+                corners.extend(cell.iter().map_while(|corner| there(corner).filter(is_in)));
+                if corners.len() == cell.len() {
+                    corners.iter().for_each(|&corner| is_corner[corner] = true);
+                }
+            }
+        }
+        let loose = self.cells.iter_mut().zip(is_corner).filter(|(_, is_corner)| !is_corner);
+        loose.for_each(|(cell, _)| *cell = NOTHING);
+    }
+
     /// Marks every site that a body particle reaches and that is no body particle.
     fn mark_frame(&mut self, lattice: &Lattice, shell: &[Vec<Site>]) {
         for cell in (0..self.cells.len()).filter(|&cell| self.cells[cell] == BODY).collect::<Vec<_>>() {
@@ -566,15 +618,6 @@ impl SiteMap {
     fn index(&self, site: Site) -> Option<u32> {
         self.window.number(site).map(|cell| self.cells[cell]).filter(|&index| index != NOTHING)
     }
-}
-
-/// The error for a cut without a site.
-pub fn empty(lattice: &Lattice, cut: &Cut) -> BodyError {
-    let (low, high) = match cut {
-        Cut::Shape(shape) => shape.bounds(),
-        Cut::Count { .. } => ([0.0; 2], [0.0; 2]),
-    };
-    BodyError::Empty { spacing: lattice.spacing(), width: high[0] - low[0], height: high[1] - low[1] }
 }
 
 /// Grid columns from one site of a row to the next.

@@ -184,6 +184,12 @@ impl Cells {
         self.kind.push(kind);
     }
 
+    /// How many cells have their first corner before a particle, of a body whose cells are in the order of these.
+    pub fn before(&self, particle: usize) -> usize {
+        let starts = &self.starts[..self.count()];
+        starts.partition_point(|&start| (self.index[start as usize] as usize) < particle)
+    }
+
     /// Number of cells.
     pub fn count(&self) -> usize {
         self.kind.len()

@@ -23,6 +23,7 @@
 use super::cells::{Cells, Incidence};
 use super::elastic::Elastic;
 use super::stiffness::area;
+use super::stress::Over;
 
 /// Which cells are averaged together.
 #[derive(Clone, Debug)]
@@ -136,14 +137,21 @@ pub fn averaged(cells: &Cells, elastic: &Elastic, mut strains: Vec<[f64; 3]>, co
 }
 
 /// Energy \[force length\] of the averaged dilatations of cells of these mean strains; zero where the material averages none.
-pub fn energy(cells: &Cells, elastic: &Elastic, strains: &[[f64; 3]], count: usize) -> f64 {
+/// `count` is that of the particles, over some of which it is summed.
+pub fn energy(
+    cells: &Cells,
+    elastic: &Elastic,
+    strains: &[[f64; 3]],
+    (count, over): (usize, &Over<'_>),
+) -> f64 {
     let incidence = cells.incidence(count);
     let Some(patches) = Patches::new(cells, &incidence, count, elastic) else { return 0.0 };
     let (mean, measure) = patches.means(strains);
     let regions = patches.lambda.len();
     let of_region = |(region, lambda): (usize, &Option<f64>)| {
-        let all = mean.iter().zip(&measure).skip(region).step_by(regions);
-        lambda.unwrap_or(0.0) * all.map(|(mean, measure)| measure * mean * mean).sum::<f64>()
+        let patches = over.particles.clone().map(|i| i * regions + region);
+        let mut all = patches.map(|patch| measure[patch] * mean[patch] * mean[patch]);
+        lambda.unwrap_or(0.0) * (over.sum)(&mut all)
     };
     0.5 * patches.lambda.iter().enumerate().map(of_region).sum::<f64>()
 }

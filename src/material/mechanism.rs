@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::cells::{Cells, Incidence};
 use crate::flock::vectors::Vectors;
+use crate::geometry::Point;
 use crate::geometry::disjoint_sets::DisjointSets;
 
 /// How a body, or what its leaders hold of it, can move without strain. Particles are named by their
@@ -67,14 +68,56 @@ pub enum Mechanism {
 /// Linkages of more parts than this are not analysed: a hinge among them counts as a mechanism.
 const MOST_PARTS: usize = 128;
 
-/// Parts of a body and the particles at which they are pinned to each other.
-struct Linkage {
-    /// Part of each cell, counted from 0 in the order of first cells.
-    part: Vec<usize>,
-    parts: usize,
-    /// Particles in two or more parts, with those parts.
-    hinges: Vec<(usize, Vec<usize>)>,
+/// Parts of a body and the particles at which they are pinned to each other; particles by their index in the whole body.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Linkage {
+    /// The first corner of the first cell of each part, shape \[parts\].
+    pub corners: Vec<usize>,
+    /// In the order of particles.
+    pub hinges: Vec<Hinge>,
 }
+
+/// A particle in two or more parts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hinge {
+    /// Its index.
+    pub particle: usize,
+    /// Where it stands in the reference configuration \[length\].
+    pub place: Point,
+    /// The parts, ascending.
+    pub parts: Vec<usize>,
+}
+
+/// The particles of parts that are pinned to each other, and what holds them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Hold {
+    /// The first of them.
+    pub first: usize,
+    /// How many are held, if by one component.
+    pub held: usize,
+    /// How many are held altogether.
+    pub whole: usize,
+}
+
+impl Hold {
+    /// Of no particle.
+    pub const NONE: Self = Self { first: usize::MAX, held: 0, whole: 0 };
+
+    /// With one more particle, of which these components are held.
+    pub fn with(self, particle: usize, held: [bool; 2]) -> Self {
+        Self {
+            first: self.first.min(particle),
+            held: self.held + usize::from(held != [false; 2]),
+            whole: self.whole + usize::from(held == [true; 2]),
+        }
+    }
+}
+
+/// A place \[length\] and the components that are held there.
+pub type HeldPlace = (Point, [bool; 2]);
+
+/// Lower and higher corner of what the body stands in \[length\].
+pub type Bounds = (Point, Point);
 
 /// Refuses a body whose cells can move against each other without strain. `members` says which
 /// particles should belong to a cell (those that are not frame), shape \[count\].
@@ -88,12 +131,7 @@ pub fn require_rigid(
     if let Some(i) = orphan {
         return Err(Mechanism::NoCell { particle: i + 1 });
     }
-    let linkage = Linkage::of(cells, incidence, reference.len());
-    if linkage.parts <= 1 {
-        return Ok(());
-    }
-    linkage.require_joined(cells)?;
-    linkage.require_no_turning(reference, &[])
+    Linkage::of(cells, incidence, reference).1.require_rigid(bounds_of(reference))
 }
 
 /// Refuses a body that the `held` components of its particles (leaders, clamps, rollers) do not keep from moving as a
@@ -104,52 +142,42 @@ pub fn require_held(
     reference: &Vectors,
     held: &[[bool; 2]],
 ) -> Result<(), Mechanism> {
-    let linkage = Linkage::of(cells, incidence, reference.len());
+    let (part, linkage) = Linkage::of(cells, incidence, reference);
+    let part_of = |i: usize| incidence.of(i).first().map(|&cell| part[cell as usize]);
     let groups = linkage.groups();
-    let mut members: Vec<Vec<usize>> = vec![Vec::new(); linkage.parts];
-    let mut first = vec![usize::MAX; linkage.parts];
+    let group_of = |i: usize| part_of(i).map(|part| groups[part]);
+    let mut holds = vec![Hold::NONE; groups.len()];
     for (i, &held) in held.iter().enumerate() {
-        let Some(&cell) = incidence.of(i).first() else { continue };
-        let group = groups[linkage.part[cell as usize]];
-        if held != [false; 2] {
-            members[group].push(i);
-        }
-        first[group] = first[group].min(i);
-    }
-    for group in (0..linkage.parts).filter(|&group| first[group] != usize::MAX) {
-        let particle = first[group] + 1;
-        let members = &members[group];
-        let whole = members.iter().filter(|&&i| held[i] == [true; 2]).count();
-        match (members.len(), whole) {
-            (0, _) => return Err(Mechanism::Loose { particle }),
-            (1, 1) => return Err(Mechanism::Turns { particle }),
-            (_, 2..) => {}
-            _ if free_motions(reference, held, members) > 0 => return Err(Mechanism::Slides { particle }),
-            _ => {}
+        if let Some(group) = group_of(i) {
+            holds[group] = holds[group].with(i, held);
         }
     }
-    if linkage.hinges.is_empty() {
-        return Ok(());
-    }
-    let grounded: Vec<(usize, usize)> = (0..reference.len())
-        .filter(|&i| held[i] == [true; 2])
-        .flat_map(|i| incidence.of(i).iter().map(move |&cell| (i, cell)))
-        .map(|(i, cell)| (i, linkage.part[cell as usize]))
-        .collect();
-    linkage.require_no_turning(reference, &grounded)
+    let members = |group: usize| {
+        let members = (0..held.len()).filter(|&i| held[i] != [false; 2] && group_of(i) == Some(group));
+        members.map(|i| (reference.get(i), held[i])).collect()
+    };
+    let grounded = || {
+        let whole = (0..held.len()).filter(|&i| held[i] == [true; 2]);
+        let of = |i: usize| incidence.of(i).iter().map(move |&cell| (i, cell));
+        whole.flat_map(of).map(|(i, cell)| (reference.get(i), part[cell as usize])).collect()
+    };
+    linkage.require_held(bounds_of(reference), &holds, members, grounded)
 }
 
-/// Rigid motions (two translations, one turn) that the held components of these particles leave.
-fn free_motions(reference: &Vectors, held: &[[bool; 2]], members: &[usize]) -> usize {
-    let centre = members.iter().fold([0.0; 2], |[x, y], &i| {
-        let p = reference.get(i);
-        [x + p[0] / members.len() as f64, y + p[1] / members.len() as f64]
-    });
-    let from = |i: usize| [0, 1].map(|k| reference.get(i)[k] - centre[k]);
-    let size = members.iter().map(|&i| from(i)[0].hypot(from(i)[1])).fold(f64::MIN_POSITIVE, f64::max);
-    let rows = members.iter().flat_map(|&i| {
-        let [x, y] = from(i).map(|v| v / size);
-        let components = [[1.0, 0.0, -y], [0.0, 1.0, x]].into_iter().zip(held[i]);
+fn bounds_of(reference: &Vectors) -> Bounds {
+    reference.bounds(0..reference.len()).unwrap_or_default()
+}
+
+/// Rigid motions (two translations, one turn) that what is held of these particles leaves.
+fn free_motions(members: &[HeldPlace]) -> usize {
+    let centre = members
+        .iter()
+        .fold([0.0; 2], |[x, y], (p, _)| [x + p[0] / members.len() as f64, y + p[1] / members.len() as f64]);
+    let from = |p: Point| [0, 1].map(|k| p[k] - centre[k]);
+    let size = members.iter().map(|&(p, _)| from(p)[0].hypot(from(p)[1])).fold(f64::MIN_POSITIVE, f64::max);
+    let rows = members.iter().flat_map(|&(p, held)| {
+        let [x, y] = from(p).map(|v| v / size);
+        let components = [[1.0, 0.0, -y], [0.0, 1.0, x]].into_iter().zip(held);
         components.filter_map(|(row, held)| held.then_some(row))
     });
     let gram = rows.fold(Matrix3::zeros(), |sum, row| {
@@ -161,77 +189,122 @@ fn free_motions(reference: &Vectors, held: &[[bool; 2]], members: &[usize]) -> u
     values.iter().filter(|value| **value <= 1e-9 * most).count()
 }
 
+/// Label of each cell, the same for those that hang together along sides: the lowest of them, shape \[cells\].
+pub fn joined_cells(cells: &Cells, incidence: &Incidence) -> Vec<u32> {
+    let mut joined = DisjointSets::new(cells.count());
+    for cell in 0..cells.count() {
+        for side in cells.sides(cell) {
+            if let Some(other) = cells.across(incidence, side) {
+                joined.join(cell as u32, other as u32);
+            }
+        }
+    }
+    joined.labels()
+}
+
 impl Linkage {
-    fn of(cells: &Cells, incidence: &Incidence, particles: usize) -> Self {
-        let mut joined = DisjointSets::new(cells.count());
-        for cell in 0..cells.count() {
-            for side in cells.sides(cell) {
-                if let Some(other) = cells.across(incidence, side) {
-                    joined.join(cell as u32, other as u32);
-                }
+    /// The part of each cell, counted from 0 in the order of first cells, and how the parts are linked.
+    fn of(cells: &Cells, incidence: &Incidence, reference: &Vectors) -> (Vec<usize>, Self) {
+        let labels = joined_cells(cells, incidence);
+        let (mut part, mut corners) = (vec![0; labels.len()], Vec::new());
+        for (cell, &label) in labels.iter().enumerate() {
+            if label as usize == cell {
+                part[cell] = corners.len();
+                corners.push(cells.of(cell)[0] as usize);
+            } else {
+                part[cell] = part[label as usize];
             }
         }
-        let (part, parts) = joined.numbered();
-        let mut hinges = Vec::new();
-        if parts > 1 {
-            for i in 0..particles {
-                let mut here: Vec<usize> = incidence.of(i).iter().map(|&cell| part[cell as usize]).collect();
-                here.sort_unstable();
-                here.dedup();
-                if here.len() > 1 {
-                    hinges.push((i, here));
-                }
-            }
-        }
-        Self { part, parts, hinges }
+        let hinges = (0..reference.len()).filter(|_| corners.len() > 1).filter_map(|i| {
+            Hinge::of((i, reference.get(i)), incidence.of(i).iter().map(|&cell| part[cell as usize]))
+        });
+        let hinges = hinges.collect();
+        (part, Self { corners, hinges })
+    }
+
+    fn parts(&self) -> usize {
+        self.corners.len()
     }
 
     /// Label of each part such that parts pinned to each other, however loosely, share it.
-    fn groups(&self) -> Vec<usize> {
-        let mut pinned = DisjointSets::new(self.parts);
-        for (_, parts) in &self.hinges {
+    pub fn groups(&self) -> Vec<usize> {
+        let mut pinned = DisjointSets::new(self.parts());
+        for Hinge { parts, .. } in &self.hinges {
             parts.iter().for_each(|&part| pinned.join(parts[0] as u32, part as u32));
         }
         pinned.numbered().0
     }
 
-    fn require_joined(&self, cells: &Cells) -> Result<(), Mechanism> {
+    /// Refuses parts that can move against each other.
+    pub fn require_rigid(&self, bounds: Bounds) -> Result<(), Mechanism> {
+        if self.parts() <= 1 {
+            return Ok(());
+        }
+        self.require_joined()?;
+        self.require_no_turning(bounds, &[])
+    }
+
+    /// Refuses parts that can move though some of their particles are held: `holds` says how many of each group, shape
+    /// \[parts\]; `members` are those of a group, and `grounded` all that are held altogether, with each of their parts, both in
+    /// the order of particles and asked for only where the counts do not decide.
+    pub fn require_held(
+        &self,
+        bounds: Bounds,
+        holds: &[Hold],
+        members: impl Fn(usize) -> Vec<HeldPlace>,
+        grounded: impl FnOnce() -> Vec<(Point, usize)>,
+    ) -> Result<(), Mechanism> {
+        for (group, &Hold { first, held, whole }) in holds.iter().enumerate() {
+            if first == usize::MAX {
+                continue;
+            }
+            let particle = first + 1;
+            match (held, whole) {
+                (0, _) => return Err(Mechanism::Loose { particle }),
+                (1, 1) => return Err(Mechanism::Turns { particle }),
+                (_, 2..) => {}
+                _ if free_motions(&members(group)) > 0 => return Err(Mechanism::Slides { particle }),
+                _ => {}
+            }
+        }
+        if self.hinges.is_empty() { Ok(()) } else { self.require_no_turning(bounds, &grounded()) }
+    }
+
+    fn require_joined(&self) -> Result<(), Mechanism> {
         let groups = self.groups();
-        match (0..cells.count()).find(|&cell| groups[self.part[cell]] != groups[self.part[0]]) {
+        match (0..self.parts()).find(|&part| groups[part] != groups[0]) {
             None => Ok(()),
             Some(other) => {
-                let id = |cell: usize| cells.of(cell)[0] as usize + 1;
+                let id = |part: usize| self.corners[part] + 1;
                 Err(Mechanism::Apart { first: id(0), second: id(other) })
             }
         }
     }
 
-    /// Looks for motions of the parts that keep every pin together and every grounded (particle, part)
-    /// in place, other than a motion of the whole, and names the pin that turns most.
-    fn require_no_turning(&self, reference: &Vectors, grounded: &[(usize, usize)]) -> Result<(), Mechanism> {
-        if self.parts > MOST_PARTS {
-            return Err(Mechanism::Hinge { particle: self.hinges[0].0 + 1 });
+    /// Looks for motions of the parts that keep every pin together and every grounded place of a part
+    /// where it is, other than a motion of the whole, and names the pin that turns most.
+    fn require_no_turning(&self, (low, high): Bounds, grounded: &[(Point, usize)]) -> Result<(), Mechanism> {
+        if self.parts() > MOST_PARTS {
+            return Err(Mechanism::Hinge { particle: self.hinges[0].particle + 1 });
         }
-        let (low, high) = reference.bounds(0..reference.len()).unwrap_or_default();
         let size = (high[0] - low[0]).max(high[1] - low[1]);
         // The velocity of a part at a particle is (tx - turn y, ty + turn x).
-        let velocity = |particle: usize, part: usize, sign: f64| {
-            let [x, y] = reference.get(particle);
+        let velocity = |[x, y]: Point, part: usize, sign: f64| {
             let (x, y) = ((x - low[0]) / size - 0.5, (y - low[1]) / size - 0.5);
             [[(3 * part, sign), (3 * part + 2, -y * sign)], [(3 * part + 1, sign), (3 * part + 2, x * sign)]]
         };
-        let mut gram = DMatrix::<f64>::zeros(3 * self.parts, 3 * self.parts);
+        let mut gram = DMatrix::<f64>::zeros(3 * self.parts(), 3 * self.parts());
         let mut constrain = |row: &[(usize, f64)]| {
             for &(a, u) in row {
                 row.iter().for_each(|&(b, v)| gram[(a, b)] += u * v);
             }
         };
-        for &(particle, part) in grounded {
-            velocity(particle, part, 1.0).iter().for_each(|row| constrain(row));
+        for &(place, part) in grounded {
+            velocity(place, part, 1.0).iter().for_each(|row| constrain(row));
         }
-        for (particle, parts) in &self.hinges {
+        for Hinge { place, parts, .. } in &self.hinges {
             for &part in &parts[1..] {
-                let (one, other) = (velocity(*particle, parts[0], 1.0), velocity(*particle, part, -1.0));
+                let (one, other) = (velocity(*place, parts[0], 1.0), velocity(*place, part, -1.0));
                 (0..2).for_each(|axis| constrain(&[one[axis], other[axis]].concat()));
             }
         }
@@ -246,16 +319,26 @@ impl Linkage {
             if *value > 1e-10 * largest {
                 continue;
             }
-            for (i, parts) in &self.hinges {
+            for Hinge { particle, parts, .. } in &self.hinges {
                 for part in parts {
                     let turning = (motion[3 * part + 2] - motion[3 * parts[0] + 2]).abs();
                     if turning > worst.0 {
-                        worst = (turning, Some(*i));
+                        worst = (turning, Some(*particle));
                     }
                 }
             }
         }
         worst.1.map_or(Ok(()), |i| Err(Mechanism::Hinge { particle: i + 1 }))
+    }
+}
+
+impl Hinge {
+    /// The particle, if the cells around it are of several parts.
+    pub fn of((particle, place): (usize, Point), parts: impl Iterator<Item = usize>) -> Option<Self> {
+        let mut parts: Vec<usize> = parts.collect();
+        parts.sort_unstable();
+        parts.dedup();
+        (parts.len() > 1).then_some(Self { particle, place, parts })
     }
 }
 

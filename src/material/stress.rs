@@ -4,6 +4,8 @@
 //! turned back by the rotation of its mean deformation gradient, as the rule does, so that a body turned by any angle is
 //! not strained; strain and stress are then those in the axes of the reference configuration.
 
+use std::ops::Range;
+
 use nalgebra::DVector;
 use rayon::prelude::*;
 
@@ -123,8 +125,38 @@ pub fn strain_energy(
     displacement: &Vectors,
     rotation: Rotation,
 ) -> Result<f64, ShapeError> {
+    strain_energy_over(cells, elastic, (displacement, rotation), &Over::all(cells, displacement.len()))
+}
+
+/// The things that an energy is summed over: cells, or particles around which dilatations are averaged.
+pub struct Over<'a> {
+    /// Those of the cells.
+    pub cells: Range<usize>,
+    /// Those of the particles.
+    pub particles: Range<usize>,
+    /// Adds up what they have, in their order.
+    pub sum: &'a dyn Fn(&mut dyn Iterator<Item = f64>) -> f64,
+}
+
+impl Over<'_> {
+    /// All of a body of so many particles.
+    pub fn all(cells: &Cells, particles: usize) -> Self {
+        Self { cells: 0..cells.count(), particles: 0..particles, sum: &|all| all.sum() }
+    }
+}
+
+/// As [`strain_energy`], summed over these cells.
+///
+/// # Errors
+/// As [`strain_energy`].
+pub fn strain_energy_over(
+    cells: &Cells,
+    elastic: &Elastic,
+    (displacement, rotation): (&Vectors, Rotation),
+    over: &Over<'_>,
+) -> Result<f64, ShapeError> {
     let rest = Vectors::zeros(displacement.len());
-    energy_between(cells, elastic, [displacement, &rest], rotation)
+    energy_over(cells, elastic, ([displacement, &rest], rotation), over)
 }
 
 /// Strain energy of the cells \[force length\] under the difference of two displacements \[length\] of their corners, each
@@ -138,6 +170,16 @@ pub fn energy_between(
     displacements: [&Vectors; 2],
     rotation: Rotation,
 ) -> Result<f64, ShapeError> {
+    let over = Over::all(cells, displacements[0].len());
+    energy_over(cells, elastic, (displacements, rotation), &over)
+}
+
+fn energy_over(
+    cells: &Cells,
+    elastic: &Elastic,
+    (displacements, rotation): ([&Vectors; 2], Rotation),
+    over: &Over<'_>,
+) -> Result<f64, ShapeError> {
     let kinds = 0..cells.shapes.len();
     let elements: Result<Vec<_>, _> = kinds.map(|kind| cells.element(kind, elastic)).collect();
     let elements = elements?;
@@ -146,18 +188,22 @@ pub fn energy_between(
         let u = DVector::from_vec(a.zip(b).map(|(a, b)| a - b).collect());
         0.5 * u.dot(&(&elements[cells.kind[cell] as usize] * &u))
     };
-    let own: f64 = (0..cells.count()).map(of_cell).sum();
+    let own = (over.sum)(&mut over.cells.clone().map(of_cell));
     if !cells.average_dilatations(elastic) {
         return Ok(own);
     }
     let [mut apart, other] = displacements.map(|u| strains(cells, u, rotation));
     apart.iter_mut().zip(other).for_each(|(a, b)| *a = std::array::from_fn(|k| a[k] - b[k]));
-    Ok(own + dilatation::energy(cells, elastic, &apart, displacements[0].len()))
+    Ok(own + dilatation::energy(cells, elastic, &apart, (displacements[0].len(), over)))
 }
 
-/// How far each cell is turned \[rad\], shape \[cells\].
-pub fn turns<'a>(cells: &'a Cells, displacement: &'a Vectors) -> impl Iterator<Item = f64> + 'a {
-    (0..cells.count()).map(move |cell| turn(cells.shape(cell), &relative(cells, cell, displacement)))
+/// How far each of some cells is turned \[rad\], shape \[cells\].
+pub fn turns<'a>(
+    cells: &'a Cells,
+    of: Range<usize>,
+    displacement: &'a Vectors,
+) -> impl Iterator<Item = f64> + 'a {
+    of.map(move |cell| turn(cells.shape(cell), &relative(cells, cell, displacement)))
 }
 
 /// Displacement of a cell's corners in the axes that turn with the cell, less that of the first \[length\].

@@ -115,12 +115,31 @@ pub enum WeightsError {
     },
 }
 
+impl WeightsError {
+    /// The same where the first particle has this index in the whole body, in which a particle has as many neighbours at most.
+    pub fn in_whole(self, first: usize, most: usize) -> Self {
+        match self {
+            Self::MissingNeighbour { particle, missing, corners, .. } => Self::MissingNeighbour {
+                particle: first + particle,
+                missing: first + missing,
+                neighbours: most,
+                corners,
+            },
+            Self::MissingMate { particle, missing, .. } => {
+                Self::MissingMate { particle: first + particle, missing: first + missing, neighbours: most }
+            }
+            Self::Singular { particle } => Self::Singular { particle: first + particle },
+            other => other,
+        }
+    }
+}
+
 impl MaterialWeights {
     /// Weights of a body cut from a lattice: one material throughout.
     ///
     /// `neighbours` are those the body was built with (see [`super::cells::neighbourhood`] for the
     /// fewest that will do); every particle that shares a cell must be among them. Refuses a body
-    /// that its cells do not hold together.
+    /// that its cells do not hold together; of a part of one that is for all parts to find out.
     pub fn assemble(
         cells: &Cells,
         body: &Body,
@@ -128,7 +147,9 @@ impl MaterialWeights {
         elastic: &Elastic,
     ) -> Result<Self, WeightsError> {
         let incidence = cells.incidence(body.count());
-        require_rigid(cells, &incidence, &body.reference, |i| !body.is_frame[i])?;
+        if body.part.is_none() {
+            require_rigid(cells, &incidence, &body.reference, |i| !body.is_frame[i])?;
+        }
         Self::gather(cells, &incidence, neighbours, elastic, None)
     }
 

@@ -4,14 +4,12 @@ use std::ops::ControlFlow;
 use std::sync::atomic::AtomicBool;
 use std::thread;
 
-use flockform::continuum::digest::{digest, digest_of_parts};
 use flockform::continuum::equilibrium::{run_to_equilibrium_shared, run_to_equilibrium_watched};
-use flockform::continuum::parts::laid_out_whole_for;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, SharedError, require_shareable, run_shared, run_watched};
 use flockform::continuum::shares::{Exchanged, Shares};
 use flockform::engine::Engine;
-use flockform::engine::observer::{EachStep, Observer};
+use flockform::engine::observer::Observer;
 use flockform::engine::probes::ProbeSeries;
 use flockform::engine::shared::NotShared;
 use flockform::engine::state::EngineState;
@@ -22,7 +20,8 @@ use flockform::solve::interrupt::Interrupt;
 
 use scenes::{load, planned};
 
-#[path = "common/scenes.rs"]
+mod parts;
+#[path = "../common/scenes.rs"]
 mod scenes;
 
 /// Everything that a run leaves, to the bit.
@@ -36,8 +35,9 @@ struct End {
     roles: String,
     /// Steps that were looked at, and a hash of all places at each.
     seen: Vec<(usize, u64)>,
-    /// Of a body in parts.
+    /// Of a body in parts, and what is measured on a material.
     probes: Vec<ProbeSeries>,
+    readings: String,
 }
 
 impl End {
@@ -54,6 +54,7 @@ impl End {
             roles: format!("{:?}", engine.roles()),
             seen,
             probes: Vec::new(),
+            readings: String::new(),
         }
     }
 }
@@ -597,210 +598,4 @@ fn an_error_in_a_halo_of_a_solver_is_seen_in_the_bits() {
     let found = on_ranks(2, |team| solved_on(&scene, &plan, &Team::new(Noisy(team))));
     // It may find no equilibrium at all.
     assert!(found.into_iter().all(|rest| rest.map_or(true, |rest| rest != expected)));
-}
-
-/// States of the parts of a body, each with the number of its first particle, its histories, and a residual.
-type KeptParts = (Vec<(usize, EngineState<'static>)>, Vec<ProbeSeries>, f64);
-
-/// A body in so many parts at a step, if it comes that far.
-fn kept_parts(scene: &Scene, step: usize, ranks: usize) -> Option<KeptParts> {
-    let parts = on_ranks(ranks, |team| {
-        let plan = Plan::of_part(scene, &team).unwrap_or_else(|error| panic!("{error}"));
-        let first = plan.setup.body.first() + plan.setup.body.owned().start;
-        let mut looks = Looks { keep_at: Some(step), ..Looks::every(step) };
-        let outcome = run_shared(plan, None, &team, &mut looks).expect("can be shared");
-        let (state, residual) = looks.kept?;
-        Some((first, state, outcome.engine.probes().to_vec(), residual))
-    });
-    let parts: Vec<_> = parts.into_iter().collect::<Option<_>>()?;
-    let residual = parts[0].3;
-    let probes = parts.iter().flat_map(|part| part.2.clone()).collect();
-    Some((parts.into_iter().map(|(first, state, ..)| (first, state)).collect(), probes, residual))
-}
-
-/// The end of a body of which each rank has a part, put together.
-fn parted(scene: &Scene, every: usize, ranks: usize, from: Option<&KeptParts>) -> End {
-    assert_eq!(laid_out_whole_for(scene), None);
-    let sum = digest(&planned(scene));
-    let ends = on_ranks(ranks, |team| {
-        let mut plan = Plan::of_part(scene, &team).unwrap_or_else(|error| panic!("{error}"));
-        let (count, owned) = (plan.count(), plan.setup.body.owned());
-        assert_eq!(digest_of_parts(&plan, &team), sum);
-        let mut looks = Looks::every(if team.is_first() { every } else { 1 });
-        let from = from.map(|(parts, probes, residual)| {
-            plan.setup.probes.iter_mut().for_each(|own| own.clone_from(probes));
-            (EngineState::of_pieces(parts, &plan.setup).expect("of this body"), *residual)
-        });
-        let outcome = run_shared(plan, from, &team, &mut looks).expect("can be shared");
-        let engine = &outcome.engine;
-        let of = |points: &Vectors, i: usize| (points.x[i], points.y[i]);
-        let places: Vec<_> =
-            owned.clone().map(|i| (of(engine.present(), i), of(engine.previous(), i))).collect();
-        let energies: Vec<_> = owned.clone().map(|i| [engine.pe1(i), engine.pe2(i)]).collect();
-        let roles = engine.roles()[owned.clone()].to_vec();
-        let sums = engine.energies();
-        (
-            places,
-            energies,
-            roles,
-            (engine.step(), format!("{:?}", outcome.reason)),
-            (outcome.residual, sums),
-            count,
-            engine.probes().to_vec(),
-            format!("{:?}", engine.breaks()),
-        )
-    });
-    let (step, reason) = ends[0].3.clone();
-    let (residual, sums) = ends[0].4;
-    let mut end = End {
-        step,
-        reason,
-        places: Vec::new(),
-        residual: residual.to_bits(),
-        breaks: ends[0].7.clone(),
-        roles: String::new(),
-        seen: Vec::new(),
-        probes: Vec::new(),
-    };
-    for one in &ends {
-        assert_eq!((&one.3.0, &one.3.1), (&end.step, &end.reason));
-        assert_eq!(one.7, end.breaks);
-        assert_eq!((one.4.0.to_bits(), one.4.1.map(f64::to_bits)), (end.residual, sums.map(f64::to_bits)));
-    }
-    let all =
-        |of: &dyn Fn(usize) -> Vec<f64>| (0..ends.len()).flat_map(of).map(f64::to_bits).collect::<Vec<_>>();
-    end.places.extend(all(&|r| ends[r].0.iter().map(|(now, _)| now.0).collect()));
-    end.places.extend(all(&|r| ends[r].0.iter().map(|(now, _)| now.1).collect()));
-    end.places.extend(all(&|r| ends[r].0.iter().map(|(_, then)| then.0).collect()));
-    end.places.extend(all(&|r| ends[r].0.iter().map(|(_, then)| then.1).collect()));
-    end.places.extend(all(&|r| ends[r].1.iter().flatten().copied().collect()));
-    let roles: Vec<_> = ends.iter().flat_map(|one| one.2.clone()).collect();
-    end.roles = format!("{roles:?}");
-    // Each is on one rank; the lists of the test are ascending.
-    end.probes = ends.iter().flat_map(|one| one.6.clone()).collect();
-    end.seen.push((ends.iter().map(|one| one.5).max().unwrap_or(0), 0));
-    end
-}
-
-/// The histories of a run alone that is looked at in each step.
-fn probed(scene: &Scene) -> Vec<ProbeSeries> {
-    let plan = planned(scene);
-    let mut probes: Vec<_> = plan.probes.iter().map(|&index| ProbeSeries::new(index)).collect();
-    let mut see = |engine: &Engine, _: f64| {
-        probes.iter_mut().for_each(|probe| probe.record(engine));
-        ControlFlow::Continue(())
-    };
-    run_watched(plan, &mut EachStep(&mut see));
-    probes
-}
-
-fn assert_parted_the_same(name: &str, sets: &[&str], every: usize) {
-    let scene = load(name, sets);
-    let expected = End { seen: Vec::new(), probes: probed(&scene), ..alone(&scene, every) };
-    let kept = kept_parts(&scene, every, 3);
-    let begun = [1, 2, 3, 5, 8].map(|ranks| (ranks, None));
-    for (ranks, from) in begun.into_iter().chain([(2, kept.as_ref()), (4, kept.as_ref())]) {
-        let found = End { seen: Vec::new(), ..parted(&scene, every, ranks, from) };
-        let from = from.map_or("", |_| ", begun in 3");
-        let what = format!("{name} {sets:?} in {ranks} parts{from}");
-        assert_eq!(
-            (found.step, &found.reason, found.residual),
-            (expected.step, &expected.reason, expected.residual),
-            "{what}"
-        );
-        assert!(found.roles == expected.roles, "{what}: roles");
-        assert!(found.probes == expected.probes, "{what}: probes");
-        assert!(found.breaks == expected.breaks, "{what}: broken bonds");
-        assert!(found == expected, "{what}");
-    }
-}
-
-#[test]
-fn a_body_laid_out_in_parts_has_the_bits_of_one_laid_out_as_a_whole() {
-    let small = ["record.probes=[]", "stop.steps=60"];
-    for (name, more) in [
-        ("tension", &["frame=none"][..]),
-        ("tension", &[]),
-        ("tension-immediate", &[]),
-        ("feedback-oscillate", &[]),
-        ("poisson-term", &[]),
-        ("power-mean", &[]),
-        ("distance-weights", &[]),
-        ("lattice-honeycomb", &[]),
-        ("lattice-hexagonal", &[]),
-    ] {
-        assert_parted_the_same(name, &[&small[..], more].concat(), 25);
-    }
-}
-
-#[test]
-fn probes_of_a_body_in_parts_are_those_of_a_run_alone() {
-    let body = "body.shape={kind=\"grid\",columns=120,rows=9}";
-    let probes = "record.probes=[1,2,300,301,455,540,541,700,1000,1080]";
-    let leaders = "roles=[{region={kind=\"edge\",side=\"left\"},role=\"clamped\"},\
-         {region={kind=\"edge\",side=\"right\"},role=\"leader\",motion={kind=\"velocity\",per_step=[0.6,0.0]}}]";
-    for (name, more) in [
-        ("tension", &["frame=none"][..]),
-        // Looked at now and then: most steps are taken together.
-        ("tension", &["frame=\"lagged\""]),
-        ("tension-immediate", &[]),
-        ("poisson-term", &["frame=none"]),
-        ("tension", &["frame=none", "stop.tolerance=0.02", leaders]),
-        // It diverges.
-        ("tension", &["frame=none", "update.damping=1.5", leaders]),
-        ("lattice-hexagonal", &["frame=none"]),
-    ] {
-        assert_parted_the_same(name, &[&[body, probes, "stop.steps=90"][..], more].concat(), 40);
-    }
-}
-
-#[test]
-fn what_is_found_on_the_way_of_a_body_in_parts_is_what_a_run_alone_finds() {
-    let probes = "record.probes=[1,30,60,61,100]";
-    let all = "region={kind=\"all\"}";
-    let far = format!("roles[2]={{{all},role=\"clamped\",when={{quantity=\"displacement\",above=1.5}}}}");
-    let led = format!(
-        "roles[2]={{{all},role=\"leader\",from=5,when={{quantity=\"pe1\",above=0.02}},\
-         motion={{kind=\"velocity\",per_step=[0.01,0.02]}}}}"
-    );
-    let ghost = format!("roles[2]={{{all},role=\"ghost\",from=9,when={{quantity=\"pe1\",above=0.3}}}}");
-    let ghosts = "roles[2]={region={kind=\"box\",min=[4.5,0.5],max=[6.5,2.5]},role=\"ghost\"}";
-    let later = "roles[2]={region={kind=\"disc\",centre=[8.0,2.0],radius=1.2},role=\"ghost\",from=20}";
-    let cuts = "cuts=[{from=[7.5,-1.0],to=[7.5,1.6]},{from=[2.2,1.4],to=[12.4,1.6]}]";
-    let stretch = |ghosts: &str| format!("fracture={{stretch=1.2,ghosts=\"{ghosts}\"}}");
-    let [lattice, mirrored, none] = ["lattice", "mirrored", "none"].map(stretch);
-    let action = "actions=[{at=12,what={kind=\"cut\",from=[6.5,-5.0],to=[6.5,6.2]}},\
-         {at=30,what={kind=\"cut\",from=[-1.0,4.5],to=[8.0,4.5]}}]";
-    let holed = "body={outline=\"lattice\",shape={kind=\"rectangle\",max=[20,9]},\
-         holes=[{kind=\"disc\",centre=[9.4,4.3],radius=2.6}]}";
-    let along_hole = "roles[2]={region={kind=\"outline\",hole=1},role=\"clamped\"}";
-    let folder = tempfile::tempdir().expect("a folder");
-    let file = folder.path().join("led.csv");
-    let rows: String = (0..10).map(|row| format!("9,{row},3.5,{}\n", 0.3 * f64::from(row))).collect();
-    std::fs::write(&file, format!("x,y,ux,uy\n{rows}")).expect("written");
-    let table = format!("roles[1].motion={{kind=\"csv\",file={file:?},steps=40}}");
-    for (name, more) in [
-        ("tension", &[&far[..]][..]),
-        ("tension", &[&led]),
-        ("tension", &[&ghost]),
-        ("tension", &[&ghost, "frame=none", &none]),
-        ("tension", &[ghosts]),
-        ("tension", &[later, "frame=none"]),
-        ("tension", &[cuts, ghosts]),
-        ("tension", &[cuts, "frame=none", &none]),
-        ("fracture", &[]),
-        ("fracture", &[&lattice]),
-        ("fracture", &[&mirrored]),
-        ("fracture", &[&none]),
-        ("fracture", &[&none, "frame=none"]),
-        ("fracture-hexagonal", &[]),
-        ("tension-immediate", &[cuts]),
-        ("tension", &[action]),
-        ("tension", &[action, "frame=none"]),
-        ("tension", &[holed, along_hole, "frame=none"]),
-        ("tension", &[&table]),
-    ] {
-        let steps = if name.starts_with("fracture") { "stop.steps=100" } else { "stop.steps=60" };
-        assert_parted_the_same(name, &[&[probes, steps][..], more].concat(), 25);
-    }
 }

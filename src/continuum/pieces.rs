@@ -1,0 +1,149 @@
+//! The pieces that a body falls into, where each rank has a part of it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+use crate::flock::body::{Body, BodyError, Part};
+use crate::flock::neighbourhood::Neighbours;
+use crate::geometry::disjoint_sets::DisjointSets;
+use crate::material::cells::{Cells, Incidence};
+use crate::material::mechanism::{Hinge, Linkage, joined_cells};
+use crate::ranks::Team;
+
+/// Pieces that particles, or cells, of all ranks make up.
+struct Pieces {
+    /// The first of each piece, by its number in the whole body; ascending.
+    firsts: Vec<u64>,
+    /// Number of the piece, by label on this rank.
+    of_label: BTreeMap<u32, usize>,
+}
+
+impl Pieces {
+    /// `labels` are the same for those that hang together here, of which the first one that stands here has the number `first`
+    /// in the whole body; those `owned` that are `members` belong to this rank, and those in `beyond` to others: where the pieces of
+    /// two ranks meet, at least one of both must name one that the other owns.
+    fn among(
+        team: &Team,
+        labels: &[u32],
+        (first, owned): (usize, Range<usize>),
+        members: impl Fn(usize) -> bool,
+        beyond: impl Iterator<Item = usize>,
+    ) -> Self {
+        let rank = team.rank() as u64;
+        let labelled: Vec<u64> =
+            beyond.flat_map(|i| [(first + i) as u64, rank, u64::from(labels[i])]).collect();
+        let all = team.gather_all(&labelled);
+        let here = |number: u64| (number as usize).checked_sub(first).filter(|i| owned.contains(i));
+        let pairs: BTreeSet<[u64; 4]> = all
+            .chunks_exact(3)
+            .filter_map(|of| Some([of[1], of[2], rank, u64::from(labels[here(of[0])?])]))
+            .collect();
+        let pairs = team.gather_all(&pairs.into_iter().flatten().collect::<Vec<_>>());
+        // The first of each piece of this rank.
+        let mut pieces: BTreeMap<u32, u64> = BTreeMap::new();
+        for i in owned.filter(|&i| members(i)) {
+            pieces.entry(labels[i]).or_insert((first + i) as u64);
+        }
+        let own: Vec<u64> =
+            pieces.into_iter().flat_map(|(label, number)| [rank, u64::from(label), number]).collect();
+        let pieces = team.gather_all(&own);
+        let numbers: BTreeMap<[u64; 2], u32> = {
+            let nodes = pieces.chunks_exact(3).map(|of| [of[0], of[1]]);
+            let ends = pairs.chunks_exact(2).map(|of| [of[0], of[1]]);
+            nodes.chain(ends).collect::<BTreeSet<_>>().into_iter().zip(0..).collect()
+        };
+        let mut sets = DisjointSets::new(numbers.len());
+        for pair in pairs.chunks_exact(4) {
+            sets.join(numbers[&[pair[0], pair[1]]], numbers[&[pair[2], pair[3]]]);
+        }
+        let joined = sets.labels();
+        let mut of_joined: BTreeMap<u32, u64> = BTreeMap::new();
+        for of in pieces.chunks_exact(3) {
+            let known = of_joined.entry(joined[numbers[&[of[0], of[1]]] as usize]).or_insert(of[2]);
+            *known = of[2].min(*known);
+        }
+        let mut firsts: Vec<u64> = of_joined.values().copied().collect();
+        firsts.sort_unstable();
+        let piece = |node: u32| firsts.binary_search(of_joined.get(&joined[node as usize])?).ok();
+        let own = numbers.iter().filter(|([of, _], _)| *of == rank);
+        let of_label = own.filter_map(|([_, label], &node)| Some((*label as u32, piece(node)?))).collect();
+        Self { firsts, of_label }
+    }
+}
+
+/// Refuses a body that is in pieces, as [`Body::require_connected`] does; for all ranks together.
+///
+/// # Errors
+/// On all ranks alike.
+pub fn require_connected(body: &Body, neighbours: &Neighbours, team: &Team) -> Result<(), BodyError> {
+    let Some(Part { first, owned, exact, .. }) = &body.part else {
+        return body.require_connected(neighbours);
+    };
+    let mut sets = DisjointSets::new(body.count());
+    for i in exact.clone() {
+        let seen = neighbours.of(i).iter().filter(|&&k| !body.is_frame[k as usize]);
+        seen.filter(|&&k| exact.contains(&(k as usize))).for_each(|&k| sets.join(i as u32, k));
+    }
+    // Those just beyond the end of this part, by which bonds lead to others: as far as the last of its own see.
+    let sees = |i: usize| neighbours.of(i).iter().map(|&k| k as usize).max().unwrap_or(i);
+    let end = owned.clone().map(sees).max().map_or(owned.end, |last| (last + 1).clamp(owned.end, exact.end));
+    let members = |i: usize| !body.is_frame[i];
+    let beyond = (owned.end..end).filter(|&i| members(i));
+    let pieces = Pieces::among(team, &sets.labels(), (*first, owned.clone()), members, beyond);
+    match pieces.firsts[..] {
+        [first, second, ..] => {
+            let [first, second] = [first, second].map(|index| index as usize + 1);
+            Err(BodyError::Disconnected { parts: pieces.firsts.len(), first, second })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The cells of a part among those of the whole body: the number of the first one that stands here, and those that belong to this
+/// part, as their first corners do.
+pub fn owned_cells(body: &Body, cells: &Cells, team: &Team) -> (usize, Range<usize>) {
+    let owned = body.owned();
+    let owned = cells.before(owned.start)..cells.before(owned.end);
+    let counts = team.each([owned.len() as u64]);
+    let before: u64 = counts.iter().take(team.rank()).map(|[count]| count).sum();
+    (before as usize - owned.start, owned)
+}
+
+/// How the parts of a body in which cells are rigid together are linked, found by all ranks; and which part each cell belongs to
+/// that has a corner that this rank owns, or is a neighbour of one that it owns, shape \[cells\].
+pub fn linkage(body: &Body, (cells, incidence): (&Cells, &Incidence), team: &Team) -> (Vec<usize>, Linkage) {
+    let labels = joined_cells(cells, incidence);
+    let (first, owned) = owned_cells(body, cells, team);
+    let corners = owned.clone().flat_map(|cell| cells.of(cell)).map(|&i| i as usize).chain(body.owned());
+    let around = corners.collect::<BTreeSet<_>>().into_iter().flat_map(|i| incidence.of(i));
+    let beyond: BTreeSet<usize> = around.map(|&cell| cell as usize).filter(|c| !owned.contains(c)).collect();
+    let Pieces { firsts, of_label } =
+        Pieces::among(team, &labels, (first, owned.clone()), |_| true, beyond.into_iter());
+    let part: Vec<usize> = labels.iter().map(|l| of_label.get(l).copied().unwrap_or(usize::MAX)).collect();
+    let whole = |i: u32| (body.first() + i as usize) as u64;
+    let own = firsts.iter().filter_map(|&number| (number as usize).checked_sub(first));
+    let own: Vec<u64> = own.filter(|c| owned.contains(c)).map(|cell| whole(cells.of(cell)[0])).collect();
+    let corners: Vec<usize> = team.gather_all(&own).into_iter().map(|index| index as usize).collect();
+    if corners.len() <= 1 {
+        return (part, Linkage { corners, hinges: Vec::new() });
+    }
+    let hinge = |i: usize| {
+        let parts = incidence.of(i).iter().map(|&cell| part[cell as usize]);
+        Hinge::of((body.first() + i, body.reference.get(i)), parts)
+    };
+    let words = |Hinge { particle, place: [x, y], parts }: Hinge| {
+        let head = [particle as u64, x.to_bits(), y.to_bits(), parts.len() as u64];
+        head.into_iter().chain(parts.into_iter().map(|part| part as u64))
+    };
+    let own: Vec<u64> = body.owned().filter_map(hinge).flat_map(words).collect();
+    let (all, mut hinges) = (team.gather_all(&own), Vec::new());
+    let mut rest = &all[..];
+    while let [particle, x, y, count, more @ ..] = rest {
+        let (parts, after) = more.split_at(*count as usize);
+        let place = [x, y].map(|&bits| f64::from_bits(bits));
+        let parts = parts.iter().map(|&part| part as usize).collect();
+        hinges.push(Hinge { particle: *particle as usize, place, parts });
+        rest = after;
+    }
+    (part, Linkage { corners, hinges })
+}

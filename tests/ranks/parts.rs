@@ -1,0 +1,352 @@
+//! A body of which each rank lays out a part, and none the whole, ends with the bits of one laid out as a whole.
+
+use std::ops::ControlFlow;
+
+use flockform::continuum::digest::{digest, digest_of_parts};
+use flockform::continuum::mechanics::{Mechanics, Stresses};
+use flockform::continuum::parts::laid_out_whole_for;
+use flockform::continuum::plan::Plan;
+use flockform::continuum::run::{run_shared, run_watched};
+use flockform::engine::Engine;
+use flockform::engine::observer::EachStep;
+use flockform::engine::probes::ProbeSeries;
+use flockform::engine::state::EngineState;
+use flockform::flock::vectors::Vectors;
+use flockform::material::stress::StressState;
+use flockform::scene::Scene;
+
+use super::scenes::{load, planned};
+use super::{End, Looks, alone, on_ranks};
+
+/// States of the parts of a body, each with the number of its first particle, its histories, and a residual.
+type KeptParts = (Vec<(usize, EngineState<'static>)>, Vec<ProbeSeries>, f64);
+
+/// A body in so many parts at a step, if it comes that far.
+fn kept_parts(scene: &Scene, step: usize, ranks: usize) -> Option<KeptParts> {
+    let parts = on_ranks(ranks, |team| {
+        let plan = Plan::of_part(scene, &team).unwrap_or_else(|error| panic!("{error}"));
+        let first = plan.setup.body.first() + plan.setup.body.owned().start;
+        let mut looks = Looks { keep_at: Some(step), ..Looks::every(step) };
+        let outcome = run_shared(plan, None, &team, &mut looks).expect("can be shared");
+        let (state, residual) = looks.kept?;
+        Some((first, state, outcome.engine.probes().to_vec(), residual))
+    });
+    let parts: Vec<_> = parts.into_iter().collect::<Option<_>>()?;
+    let residual = parts[0].3;
+    let probes = parts.iter().flat_map(|part| part.2.clone()).collect();
+    Some((parts.into_iter().map(|(first, state, ..)| (first, state)).collect(), probes, residual))
+}
+
+/// The end of a body of which each rank has a part, put together.
+fn parted(scene: &Scene, every: usize, ranks: usize, from: Option<&KeptParts>) -> End {
+    assert_eq!(laid_out_whole_for(scene), None);
+    let sum = digest(&planned(scene));
+    let ends = on_ranks(ranks, |team| {
+        let mut plan = Plan::of_part(scene, &team).unwrap_or_else(|error| panic!("{error}"));
+        let (count, owned) = (plan.count(), plan.setup.body.owned());
+        assert_eq!(digest_of_parts(&plan, &team), sum);
+        let mut looks = Looks::every(if team.is_first() { every } else { 1 });
+        let from = from.map(|(parts, probes, residual)| {
+            plan.setup.probes.iter_mut().for_each(|own| own.clone_from(probes));
+            (EngineState::of_pieces(parts, &plan.setup).expect("of this body"), *residual)
+        });
+        let outcome = run_shared(plan, from, &team, &mut looks).expect("can be shared");
+        let engine = &outcome.engine;
+        let (readings, stresses) = measured(scene, engine);
+        let of = |points: &Vectors, i: usize| (points.x[i], points.y[i]);
+        let places: Vec<_> =
+            owned.clone().map(|i| (of(engine.present(), i), of(engine.previous(), i))).collect();
+        let energies: Vec<_> = owned.clone().map(|i| [engine.pe1(i), engine.pe2(i)]).collect();
+        let roles = engine.roles()[owned.clone()].to_vec();
+        let sums = engine.energies();
+        (
+            places,
+            energies,
+            roles,
+            (engine.step(), format!("{:?}", outcome.reason)),
+            (outcome.residual, sums),
+            count,
+            engine.probes().to_vec(),
+            (format!("{:?}", engine.breaks()), readings, stresses),
+        )
+    });
+    let (step, reason) = ends[0].3.clone();
+    let (residual, sums) = ends[0].4;
+    let mut end = End {
+        step,
+        reason,
+        places: Vec::new(),
+        residual: residual.to_bits(),
+        breaks: ends[0].7.0.clone(),
+        roles: String::new(),
+        seen: Vec::new(),
+        probes: Vec::new(),
+        readings: ends[0].7.1.clone(),
+    };
+    for one in &ends {
+        assert_eq!((&one.3.0, &one.3.1), (&end.step, &end.reason));
+        assert_eq!((&one.7.0, &one.7.1), (&end.breaks, &end.readings));
+        assert_eq!((one.4.0.to_bits(), one.4.1.map(f64::to_bits)), (end.residual, sums.map(f64::to_bits)));
+    }
+    let all =
+        |of: &dyn Fn(usize) -> Vec<f64>| (0..ends.len()).flat_map(of).map(f64::to_bits).collect::<Vec<_>>();
+    end.places.extend(all(&|r| ends[r].0.iter().map(|(now, _)| now.0).collect()));
+    end.places.extend(all(&|r| ends[r].0.iter().map(|(now, _)| now.1).collect()));
+    end.places.extend(all(&|r| ends[r].0.iter().map(|(_, then)| then.0).collect()));
+    end.places.extend(all(&|r| ends[r].0.iter().map(|(_, then)| then.1).collect()));
+    end.places.extend(all(&|r| ends[r].1.iter().flatten().copied().collect()));
+    end.places.extend(ends.iter().flat_map(|one| one.7.2.iter().copied()));
+    let roles: Vec<_> = ends.iter().flat_map(|one| one.2.clone()).collect();
+    end.roles = format!("{roles:?}");
+    // Each is on one rank; the lists of the test are ascending.
+    end.probes = ends.iter().flat_map(|one| one.6.clone()).collect();
+    end.seen.push((ends.iter().map(|one| one.5).max().unwrap_or(0), 0));
+    end
+}
+
+/// The readings on the whole body, and stresses of a rank's own particles; nothing without a material.
+fn measured(scene: &Scene, engine: &Engine) -> (String, Vec<u64>) {
+    let Some(elastic) = &scene.material else { return Default::default() };
+    let stresses = Stresses::at_present(engine, elastic).expect("there are cells");
+    let own = engine.body().owned().map(|i| stresses.particles[i]);
+    let of =
+        |stress: Option<StressState>| stress.map_or([1; 3], |stress| stress.components.map(f64::to_bits));
+    let readings = Mechanics::under(&stresses, engine, elastic).expect("there are cells");
+    (format!("{readings:#?}"), own.flat_map(of).collect())
+}
+
+/// The histories of a run alone that is looked at in each step, and what is measured at its end.
+fn probed(scene: &Scene) -> (Vec<ProbeSeries>, (String, Vec<u64>)) {
+    let plan = planned(scene);
+    let mut probes: Vec<_> = plan.probes.iter().map(|&index| ProbeSeries::new(index)).collect();
+    let mut see = |engine: &Engine, _: f64| {
+        probes.iter_mut().for_each(|probe| probe.record(engine));
+        ControlFlow::Continue(())
+    };
+    let outcome = run_watched(plan, &mut EachStep(&mut see));
+    (probes, measured(scene, &outcome.engine))
+}
+
+fn assert_parted_the_same(name: &str, sets: &[&str], every: usize) {
+    assert_scene_parted_the_same(&load(name, sets), &format!("{name} {sets:?}"), every);
+}
+
+fn assert_scene_parted_the_same(scene: &Scene, name: &str, every: usize) {
+    let (probes, (readings, stresses)) = probed(scene);
+    let mut expected = End { seen: Vec::new(), probes, readings, ..alone(scene, every) };
+    expected.places.extend(stresses);
+    let kept = kept_parts(scene, every, 3);
+    let begun = [1, 2, 3, 5, 8].map(|ranks| (ranks, None));
+    for (ranks, from) in begun.into_iter().chain([(2, kept.as_ref()), (4, kept.as_ref())]) {
+        let found = End { seen: Vec::new(), ..parted(scene, every, ranks, from) };
+        let from = from.map_or("", |_| ", begun in 3");
+        let what = format!("{name} in {ranks} parts{from}");
+        assert_eq!(
+            (found.step, &found.reason, found.residual),
+            (expected.step, &expected.reason, expected.residual),
+            "{what}"
+        );
+        assert!(found.roles == expected.roles, "{what}: roles");
+        assert!(found.probes == expected.probes, "{what}: probes");
+        assert!(found.breaks == expected.breaks, "{what}: broken bonds");
+        assert_eq!(found.readings, expected.readings, "{what}");
+        assert!(found == expected, "{what}");
+    }
+}
+
+#[test]
+fn a_body_laid_out_in_parts_has_the_bits_of_one_laid_out_as_a_whole() {
+    let small = ["record.probes=[]", "stop.steps=60"];
+    for (name, more) in [
+        ("tension", &["frame=none"][..]),
+        ("tension", &[]),
+        ("tension-immediate", &[]),
+        ("feedback-oscillate", &[]),
+        ("poisson-term", &[]),
+        ("power-mean", &[]),
+        ("distance-weights", &[]),
+        ("lattice-honeycomb", &[]),
+        ("lattice-hexagonal", &[]),
+    ] {
+        assert_parted_the_same(name, &[&small[..], more].concat(), 25);
+    }
+}
+
+#[test]
+fn probes_of_a_body_in_parts_are_those_of_a_run_alone() {
+    let body = "body.shape={kind=\"grid\",columns=120,rows=9}";
+    let probes = "record.probes=[1,2,300,301,455,540,541,700,1000,1080]";
+    let leaders = "roles=[{region={kind=\"edge\",side=\"left\"},role=\"clamped\"},\
+         {region={kind=\"edge\",side=\"right\"},role=\"leader\",motion={kind=\"velocity\",per_step=[0.6,0.0]}}]";
+    for (name, more) in [
+        ("tension", &["frame=none"][..]),
+        // Looked at now and then: most steps are taken together.
+        ("tension", &["frame=\"lagged\""]),
+        ("tension-immediate", &[]),
+        ("poisson-term", &["frame=none"]),
+        ("tension", &["frame=none", "stop.tolerance=0.02", leaders]),
+        // It diverges.
+        ("tension", &["frame=none", "update.damping=1.5", leaders]),
+        ("lattice-hexagonal", &["frame=none"]),
+    ] {
+        assert_parted_the_same(name, &[&[body, probes, "stop.steps=90"][..], more].concat(), 40);
+    }
+}
+
+#[test]
+fn what_is_found_on_the_way_of_a_body_in_parts_is_what_a_run_alone_finds() {
+    let probes = "record.probes=[1,30,60,61,100]";
+    let all = "region={kind=\"all\"}";
+    let far = format!("roles[2]={{{all},role=\"clamped\",when={{quantity=\"displacement\",above=1.5}}}}");
+    let led = format!(
+        "roles[2]={{{all},role=\"leader\",from=5,when={{quantity=\"pe1\",above=0.02}},\
+         motion={{kind=\"velocity\",per_step=[0.01,0.02]}}}}"
+    );
+    let ghost = format!("roles[2]={{{all},role=\"ghost\",from=9,when={{quantity=\"pe1\",above=0.3}}}}");
+    let ghosts = "roles[2]={region={kind=\"box\",min=[4.5,0.5],max=[6.5,2.5]},role=\"ghost\"}";
+    let later = "roles[2]={region={kind=\"disc\",centre=[8.0,2.0],radius=1.2},role=\"ghost\",from=20}";
+    let cuts = "cuts=[{from=[7.5,-1.0],to=[7.5,1.6]},{from=[2.2,1.4],to=[12.4,1.6]}]";
+    let stretch = |ghosts: &str| format!("fracture={{stretch=1.2,ghosts=\"{ghosts}\"}}");
+    let [lattice, mirrored, none] = ["lattice", "mirrored", "none"].map(stretch);
+    let action = "actions=[{at=12,what={kind=\"cut\",from=[6.5,-5.0],to=[6.5,6.2]}},\
+         {at=30,what={kind=\"cut\",from=[-1.0,4.5],to=[8.0,4.5]}}]";
+    let holed = "body={outline=\"lattice\",shape={kind=\"rectangle\",max=[20,9]},\
+         holes=[{kind=\"disc\",centre=[9.4,4.3],radius=2.6}]}";
+    let along_hole = "roles[2]={region={kind=\"outline\",hole=1},role=\"clamped\"}";
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("led.csv");
+    let rows: String = (0..10).map(|row| format!("9,{row},3.5,{}\n", 0.3 * f64::from(row))).collect();
+    std::fs::write(&file, format!("x,y,ux,uy\n{rows}")).expect("written");
+    let table = format!("roles[1].motion={{kind=\"csv\",file={file:?},steps=40}}");
+    for (name, more) in [
+        ("tension", &[&far[..]][..]),
+        ("tension", &[&led]),
+        ("tension", &[&ghost]),
+        ("tension", &[&ghost, "frame=none", &none]),
+        ("tension", &[ghosts]),
+        ("tension", &[later, "frame=none"]),
+        ("tension", &[cuts, ghosts]),
+        ("tension", &[cuts, "frame=none", &none]),
+        ("fracture", &[]),
+        ("fracture", &[&lattice]),
+        ("fracture", &[&mirrored]),
+        ("fracture", &[&none]),
+        ("fracture", &[&none, "frame=none"]),
+        ("fracture-hexagonal", &[]),
+        ("tension-immediate", &[cuts]),
+        ("tension", &[action]),
+        ("tension", &[action, "frame=none"]),
+        ("tension", &[holed, along_hole, "frame=none"]),
+        ("tension", &[&table]),
+    ] {
+        let steps = if name.starts_with("fracture") { "stop.steps=100" } else { "stop.steps=60" };
+        assert_parted_the_same(name, &[&[probes, steps][..], more].concat(), 25);
+    }
+}
+
+const PLATE: &str = r#"
+title = "A plate in parts"
+lattice = { kind = "square", spacing = 1.0 }
+rule = { mean = { kind = "material" } }
+material = { kind = "isotropic", young = 1000.0, poisson = 0.3 }
+stop = { steps = 60 }
+
+[body]
+outline = "lattice"
+shape = { kind = "disc", centre = [10.3, 5.2], radius = 11.1 }
+holes = [{ kind = "disc", centre = [8.4, 4.3], radius = 2.7 }]
+
+[[roles]]
+region = { kind = "edge", side = "left", depth = 2.0 }
+role = "clamped"
+
+[[roles]]
+region = { kind = "edge", side = "right", depth = 2.0 }
+role = "leader"
+motion = { kind = "keyframes", frames = [{ step = 40, displacement = [1.5, 0.4] }] }
+
+[record]
+probes = [1, 30, 61, 100]
+"#;
+
+fn plate(text: &str, sets: &[&str]) -> Scene {
+    let all: Vec<String> = sets.iter().map(|&set| set.to_owned()).collect();
+    Scene::parse("plate", "plate", text, &all, None).unwrap_or_else(|error| panic!("{sets:?}: {error}"))
+}
+
+#[test]
+fn a_material_in_parts_has_the_bits_of_one_laid_out_as_a_whole() {
+    let grid = "body={shape={kind=\"grid\",columns=24,rows=9}}";
+    let lattice = |kind: &str| format!("lattice={{kind=\"{kind}\",spacing=1.0}}");
+    let [hexagonal, honeycomb] = ["hexagonal", "honeycomb"].map(lattice);
+    let soft = "material.poisson=0.49";
+    let rotates = "rule.mean={kind=\"material\",rotation=\"corotated\"}";
+    let inclusion = "body.inclusions=[{shape={kind=\"disc\",centre=[14.0,6.0],radius=3.1},\
+         material={kind=\"isotropic\",young=9000.0,poisson=0.2}}]";
+    let paper = ["rule.mean.kind=\"barycentre\"", "neighbours={kind=\"second\"}"];
+    let torn = "fracture={stretch=1.1,ghosts=\"none\"}";
+    let when = "roles[2]={region={kind=\"all\"},role=\"clamped\",when={quantity=\"displacement\",above=0.6}}";
+    for sets in [
+        &[][..],
+        &[grid],
+        &["lattice={kind=\"rectangular\",a=1.0,b=0.7}"],
+        &["lattice={kind=\"centred-rectangular\",a=1.5,b=1.1}"],
+        &["lattice={kind=\"oblique\",a=1.0,b=0.9,angle=70.0}"],
+        &[&hexagonal],
+        &[&honeycomb],
+        &[&honeycomb, grid],
+        &[rotates],
+        &[inclusion],
+        &[soft],
+        &[soft, &hexagonal],
+        &[soft, rotates, inclusion],
+        &["stop.tolerance=1e-3"],
+        &[when],
+        &paper,
+        &[&paper[..], &["frame=\"lagged\""]].concat(),
+        &[&paper[..], &[torn]].concat(),
+    ] {
+        assert_scene_parted_the_same(&plate(PLATE, sets), &format!("{sets:?}"), 25);
+    }
+}
+
+/// Large enough for several steps together.
+#[test]
+fn a_large_material_in_parts_too() {
+    let sets = ["body={shape={kind=\"grid\",columns=400,rows=60}}", "stop.steps=40"];
+    assert_scene_parted_the_same(&plate(PLATE, &sets), "large", 17);
+}
+
+/// What a scene is refused for as a whole and in parts, on every rank: something that says `what`.
+fn assert_refused_the_same(scene: &Scene, what: &str) {
+    assert_eq!(laid_out_whole_for(scene), None);
+    let expected = Plan::new(scene).expect_err(what).to_string();
+    assert!(expected.contains(what), "{what}: {expected}");
+    for ranks in [1, 2, 3, 5, 8] {
+        let found = on_ranks(ranks, |team| Plan::of_part(scene, &team).expect_err(what).to_string());
+        assert!(found.iter().all(|error| *error == expected), "{ranks} ranks: {found:?} {expected}");
+    }
+}
+
+#[test]
+fn a_material_in_parts_is_refused_for_what_it_is_refused_for_as_a_whole() {
+    let body = |vertices: &str| {
+        format!("body={{outline=\"lattice\",shape={{kind=\"polygon\",vertices=[{vertices}]}}}}")
+    };
+    // Two plates with a corner in common.
+    let hinge = body("[0,0],[9,0],[9,5],[18,5],[18,9],[9,9],[9,5],[0,5]");
+    let narrow = body("[0,0],[18,0],[18,0.5],[0,0.5]");
+    let few = "neighbours={kind=\"first\"}";
+    let apart = "body={outline=\"lattice\",shape={kind=\"rectangle\",max=[18,9]},\
+         holes=[{kind=\"rectangle\",min=[8.5,-1],max=[9.5,10]}]}";
+    let far = "neighbours={kind=\"within\",radius=2.9}";
+    for (what, sets) in [
+        ("like a hinge", &[&hinge[..]][..]),
+        ("no cell", &[&narrow]),
+        ("no neighbours", &[few]),
+        ("no chain of cells", &[apart, far]),
+        ("are not connected", &[apart]),
+    ] {
+        assert_refused_the_same(&plate(PLATE, &[sets, &["record.probes=[]"]].concat()), what);
+    }
+}
