@@ -127,10 +127,21 @@ impl Stresses {
             peak.cell = peak.cell.map(|cell| before + cell - engine.owned_cells().start);
             peak
         };
-        let bytes = postcard::to_stdvec(&own.map(number)).unwrap_or_default();
-        let all = team.each_bytes(&bytes).into_iter();
-        let all = all.filter_map(|bytes| postcard::from_bytes::<Option<Peak>>(&bytes).ok().flatten());
-        all.reduce(|best, next| if next.von_mises > best.von_mises { next } else { best })
+        let own = own.map(number);
+        let ids: Vec<u64> = own.iter().flat_map(|peak| &peak.particles).map(|&id| id as u64).collect();
+        let words = own.map_or([0; 5], |peak| {
+            let [x, y] = peak.place.map(f64::to_bits);
+            [ids.len() as u64, peak.von_mises.to_bits(), peak.cell.map_or(0, |cell| cell as u64), x, y]
+        });
+        let mut ids = team.gather_all(&ids).into_iter().map(|id| id as usize);
+        let all = team.each(words).into_iter().map(|[count, von_mises, cell, x, y]| Peak {
+            von_mises: f64::from_bits(von_mises),
+            cell: (cell > 0).then_some(cell as usize),
+            place: [x, y].map(f64::from_bits),
+            particles: ids.by_ref().take(count as usize).collect(),
+        });
+        all.filter(|peak| !peak.particles.is_empty())
+            .reduce(|best, next| if next.von_mises > best.von_mises { next } else { best })
     }
 
     fn own_peak(&self, engine: &Engine, cells: &Cells) -> Option<Peak> {
