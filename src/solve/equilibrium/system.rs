@@ -153,7 +153,6 @@ impl Prepared {
         right.x.iter_mut().chain(&mut right.y).for_each(|f| *f /= force);
         let stiffness = power_of_two(matrix.rows.diagonals().as_flattened().as_flattened().iter().copied());
         matrix.rows.blocks_mut().flatten().flatten().for_each(|k| *k /= stiffness);
-
         let size = dot(right.view(), right.view()).sqrt();
         let symmetric = system.asymmetric_pair().is_none();
         let scales = [1.0 / stiffness, force];
