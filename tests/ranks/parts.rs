@@ -361,6 +361,8 @@ fn loads_on_a_body_in_parts_are_those_on_one_laid_out_as_a_whole() {
         format!("{{region={{kind=\"edge\",side=\"{side}\",depth=1.5}},role=\"clamped\",axis=\"{axis}\"}}")
     };
     let rollers = format!("roles=[{},{}]", held("left", "x"), held("bottom", "y"));
+    // What holds them is then an offset of nothing.
+    let at_zero = rollers.replace(",depth=1.5", "");
     let led = "{region={kind=\"edge\",side=\"right\",depth=1.5},role=\"leader\",axis=\"x\",\
          motion={kind=\"keyframes\",frames=[{step=20,displacement=[0.8,0.0]}]}}";
     let pulled = format!("roles=[{},{},{led}]", held("left", "x"), held("bottom", "y"));
@@ -382,6 +384,7 @@ fn loads_on_a_body_in_parts_are_those_on_one_laid_out_as_a_whole() {
         &[grid, &of_ids],
         &[&rollers, &several],
         &[grid, &rollers, &of_grid],
+        &[grid, &at_zero, &of_grid, rotates],
         &[&pulled],
         &[grid, &pulled],
         &[grid, &pulled, &of_grid],
