@@ -1,6 +1,7 @@
 //! From a scene to its body: particles, their neighbours, the cells between them, and their roles.
 
 use std::collections::{BTreeMap, HashSet};
+use std::sync::Arc;
 
 use crate::engine::setup::RoleChange;
 use crate::flock::body::{Body, BodyError, Cut, Outlay};
@@ -15,6 +16,7 @@ use crate::geometry::locate::Finder;
 use crate::geometry::outline::{Outline, OutlineError, Place};
 use crate::geometry::partition::{Partition, PartitionError};
 use crate::geometry::portion::{Portion, Selection};
+use crate::material::boundary::Boundary;
 use crate::material::cells::{Cells, neighbourhood, neighbourhood_of, templates};
 use crate::material::fit::{FitError, Fitted, Part, fit_regions};
 use crate::material::outline_loads::{self, Loader, OutlineLoad, Push};
@@ -37,6 +39,8 @@ pub struct Layout {
     pub outline: Option<Outline>,
     /// The outline with the edges of inclusions, where there are any.
     pub partition: Option<Partition>,
+    /// The boundary of the cells of the whole body, where this is a part of it and the boundary is needed.
+    pub boundary: Option<Arc<Boundary>>,
 }
 
 impl Layout {
@@ -58,11 +62,11 @@ impl Layout {
                 };
                 let outline = Some(partition.outline().clone());
                 let partition = Some(partition).filter(|_| !scene.inclusions.is_empty());
-                Self { body, neighbours, cells: Some(cells), outline, partition }
+                Self { body, neighbours, cells: Some(cells), outline, partition, boundary: None }
             }
             of_lattice => {
                 let body = body_of(scene).map_err(|error| refuse_body(scene, &error))?;
-                Self::of_whole_cells(scene, body, of_lattice)?
+                Self::of_whole_cells(scene, body, of_lattice, None)?
             }
         };
         if !matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. }) {
@@ -76,9 +80,13 @@ impl Layout {
     ///
     /// # Errors
     /// As [`Layout::new`].
-    pub(super) fn of_part(scene: &Scene, body: Body, neighbours: Neighbours) -> Result<Self, SceneError> {
+    pub(super) fn of_part(
+        scene: &Scene,
+        body: (Body, Neighbours),
+        boundary: Option<Arc<Boundary>>,
+    ) -> Result<Self, SceneError> {
         require_in_range(scene)?;
-        Self::of_whole_cells(scene, (body, neighbours), None)
+        Self::of_whole_cells(scene, body, None, boundary)
     }
 
     /// A body of whole cells, or of particles alone; one that fits its outline as it is keeps that.
@@ -86,6 +94,7 @@ impl Layout {
         scene: &Scene,
         (mut body, neighbours): (Body, Neighbours),
         fitted: Option<(Fitted, Partition)>,
+        boundary: Option<Arc<Boundary>>,
     ) -> Result<Self, SceneError> {
         require_resolved(scene, &body)?;
         let mut cells = scene.material.as_ref().map(|_| Cells::of_body(&body));
@@ -103,7 +112,12 @@ impl Layout {
                 Err(_) => (None, None),
             },
             (BodySource::Cut(Cut::Count { .. }), Some(cells), _) => {
-                (cells.outline(&body.reference).ok(), None)
+                let outline = match (&boundary, &body.part) {
+                    (Some(boundary), _) => boundary.outline().ok(),
+                    (None, None) => cells.outline(&body.reference).ok(),
+                    (None, Some(_)) => None,
+                };
+                (outline, None)
             }
             _ => (None, None),
         };
@@ -113,7 +127,7 @@ impl Layout {
             cells.divide(&body.reference, regions, |p| partition.region(p));
             cells.inclusions = scene.inclusions.iter().map(|part| part.material).collect();
         }
-        Ok(Self { body, neighbours, cells, outline, partition })
+        Ok(Self { body, neighbours, cells, outline, partition, boundary })
     }
 
     /// Role changes in the order in which they are written. Leaders led by a reference
@@ -149,7 +163,8 @@ impl Layout {
         if loads.is_empty() {
             return Ok(Vec::new());
         }
-        let loader = Loader::new(cells, &self.body, self.outline.as_ref());
+        let boundary = self.boundary();
+        let loader = Loader::new(cells, &self.body, (self.outline.as_ref(), &boundary));
         let of_load = |k: usize| {
             let mut forces = Vectors::zeros(self.body.count());
             loader.add(&loads[k], &mut forces).map_err(|error| {
@@ -250,21 +265,25 @@ impl Layout {
                 Region::Disc { centre, radius } => {
                     outline.portions(&Selection::Disc { centre: *centre, radius: *radius }, grain)
                 }
-                Region::Ids(_) => self.portions_between(&region.pick(&self.body, &self.neighbours), outline),
+                Region::Ids(ids) => self.portions_between(ids, outline),
             },
         }
     }
 
-    /// The outline along those sides of the cells' boundary both of whose particles are given.
-    fn portions_between(&self, particles: &[usize], outline: &Outline) -> Vec<Portion> {
-        let Some(cells) = &self.cells else { return Vec::new() };
-        let mut inside = vec![false; self.body.count()];
-        particles.iter().for_each(|&i| inside[i] = true);
-        let sides = cells.boundary_sides(&cells.incidence(self.body.count())).into_iter();
-        let sides = sides.filter(|side| side.iter().all(|&i| inside[i as usize]));
-        let ends = sides.map(|side| side.map(|i| self.body.reference.get(i as usize)));
+    /// The outline along those sides of the cells' boundary both of whose particles have these ids.
+    fn portions_between(&self, ids: &[usize], outline: &Outline) -> Vec<Portion> {
+        let inside: HashSet<usize> = ids.iter().filter_map(|&id| self.body.index_of(id)).collect();
+        let boundary = self.boundary();
+        let sides = boundary.ends.iter().zip(&boundary.places);
+        let sides = sides.filter(|(ends, _)| ends.iter().all(|end| inside.contains(end)));
         let grain = 1e-9 * self.body.lattice.spacing();
-        ends.flat_map(|[from, to]| outline.portions(&Selection::Between { from, to }, grain)).collect()
+        let between = |&[from, to]: &[[f64; 2]; 2]| outline.portions(&Selection::Between { from, to }, grain);
+        sides.flat_map(|(_, places)| between(places)).collect()
+    }
+
+    fn boundary(&self) -> Arc<Boundary> {
+        let of_cells = || self.cells.as_ref().map(|cells| Boundary::of(cells, &self.body.reference));
+        self.boundary.clone().unwrap_or_else(|| Arc::new(of_cells().unwrap_or_default()))
     }
 
     /// The particles on parts of the outline, or, of a body of whole cells, nearest to them, ascending.

@@ -7,12 +7,15 @@
 //! refuses all refuse.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::layout::{Layout, outlay_of, refuse_body};
-use crate::flock::body::{Census, Extent, Outlay, Part};
+use crate::flock::body::{Census, Cut, Extent, Outlay, Part, cell_width};
 use crate::flock::neighbourhood::Neighbourhood;
+use crate::material::boundary::Boundary;
+use crate::material::cells::{Cells, templates};
 use crate::ranks::Team;
-use crate::scene::{BodySource, LeaderMotion, RoleEntry, Scene, SceneError, Weights};
+use crate::scene::{BodySource, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion, Weights};
 use crate::sweep::Order;
 use crate::sweep::caches::Caches;
 use crate::sweep::domain::{Share, cuts, steps_of};
@@ -21,7 +24,7 @@ use crate::sweep::rows::usual_band;
 /// The key for which a scene has to be laid out as a whole, on every rank; `None` where each can lay out its part.
 pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
     let weights = matches!(scene.weights, Some(Weights::Solved | Weights::Gradient { .. }));
-    let keys: [(bool, &str); 10] = [
+    let keys: [(bool, &str); 9] = [
         (!matches!(scene.body, BodySource::Cut(_)), "body.shape"),
         (scene.is_fitted, "body.outline"),
         (matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. }), "neighbours.kind"),
@@ -29,15 +32,12 @@ pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
         (scene.update.order == Order::Sequential, "update.order"),
         (scene.equilibrium.is_some(), "equilibrium"),
         (scene.load_steps.is_some(), "load_steps"),
-        (!scene.loads.is_empty(), "loads"),
         (!scene.record.places.is_empty(), "record.places"),
         (scene.actions.iter().any(|action| !action.is_cut()), "actions"),
     ];
     let of_role = |(k, entry): (usize, &RoleEntry)| {
         let is_led_by_truth = matches!(entry.motion, Some(LeaderMotion::Reference { .. }));
-        let keys = [(entry.axis.is_some(), "axis"), (is_led_by_truth, "motion")];
-        let found = keys.into_iter().find(|(is, _)| *is);
-        found.map(|(_, key)| format!("roles[{k}].{key}"))
+        is_led_by_truth.then(|| format!("roles[{k}].motion"))
     };
     let key = keys.into_iter().find(|(is, _)| *is).map(|(_, key)| key.to_owned());
     key.or_else(|| scene.roles.iter().enumerate().find_map(of_role))
@@ -59,7 +59,15 @@ pub struct Parting {
     cuts: Vec<usize>,
     /// Particles of a halo on either side.
     halo: u64,
+    /// The boundary of the body's cells, where something is on it.
+    boundary: Option<Arc<Boundary>>,
 }
+
+/// A particle by the number of its column, its place in that from the bottom, and its row; column and row of the lattice.
+type Corner = [i32; 3];
+
+/// What is counted of some columns: particles of each, how far they reach, sides of cells that begin there.
+type Counted = (Vec<u64>, Extent, Vec<[Corner; 2]>);
 
 /// Most columns that are counted at once where one process counts them all.
 const AT_ONCE: i32 = 256;
@@ -77,7 +85,12 @@ impl Parting {
         let counts = team.gather(&census.counts, &sizes);
         let extents = team.each(extent_words(&census.extent)).into_iter().map(extent_of);
         let extent = extents.fold(Extent::NONE, Extent::or);
-        Self::new(scene, (columns, counts, extent), (team.count(), agreed_caches(team)))
+        let sides = agreed(scene, team, sides(scene, cut(team.rank())..cut(team.rank() + 1)))?;
+        let sides: Vec<u64> = sides.into_iter().flatten().flatten().map(|n| i64::from(n) as u64).collect();
+        let sides = team.gather_all(&sides);
+        let corner = |of: &[u64]| std::array::from_fn(|k| of[k] as i64 as i32);
+        let sides = sides.chunks_exact(6).map(|of| [corner(&of[..3]), corner(&of[3..])]).collect();
+        Self::new(scene, columns, (counts, extent, sides), (team.count(), agreed_caches(team)))
     }
 
     /// Counted by this process alone, for so many ranks.
@@ -86,18 +99,21 @@ impl Parting {
     /// The body that cannot be laid out.
     pub fn alone(scene: &Scene, ranks: usize) -> Result<Self, SceneError> {
         let columns = columns_of(scene)?;
-        let (mut counts, mut extent) = (Vec::new(), Extent::NONE);
+        let (mut counts, mut extent, mut all) = (Vec::new(), Extent::NONE, Vec::new());
         for start in columns.clone().step_by(AT_ONCE as usize) {
-            let census = census(scene, start..(start + AT_ONCE).min(columns.end))?;
+            let here = start..(start + AT_ONCE).min(columns.end);
+            let census = census(scene, here.clone())?;
             counts.extend(census.counts);
             extent = extent.or(census.extent);
+            all.extend(sides(scene, here)?);
         }
-        Self::new(scene, (columns, counts, extent), (ranks, Caches::here()))
+        Self::new(scene, columns, (counts, extent, all), (ranks, Caches::here()))
     }
 
     fn new(
         scene: &Scene,
-        (columns, counts, extent): (Range<i32>, Vec<u64>, Extent),
+        columns: Range<i32>,
+        (counts, extent, sides): Counted,
         (ranks, caches): (usize, Caches),
     ) -> Result<Self, SceneError> {
         let outlay = outlay(scene)?;
@@ -106,7 +122,7 @@ impl Parting {
         }
         let reach = outlay.reach().map_err(|error| refuse_body(scene, &error))?;
         // A cell's neighbours say over which others it averages its dilatation.
-        let margin = 2 * outlay.cell_width();
+        let margin = 2 * cell_width(&outlay.cells);
         let cuts = cuts(counts.iter().map(|&count| count as usize), ranks);
         let mut before = vec![0];
         before.extend(counts.iter().scan(0, |sum, count| {
@@ -120,7 +136,14 @@ impl Parting {
         let sizes = cuts.windows(2).map(|ends| before[ends[1]] - before[ends[0]]);
         let least = sizes.filter(|&size| size > 0).min().unwrap_or(0);
         let halo = (steps_of((least / band) as usize) as u64 + 1) * band;
-        Ok(Self { columns, before, extent, reach, margin, cuts, halo })
+        let index = |[column, k, _]: Corner| before[(column - columns.start) as usize] as usize + k as usize;
+        let place = |[column, _, row]: Corner| scene.lattice.position([column, row]);
+        let boundary = is_along_outline(scene).then(|| Boundary {
+            ends: sides.iter().map(|side| side.map(index)).collect(),
+            places: sides.iter().map(|side| side.map(place)).collect(),
+        });
+        let boundary = boundary.map(Arc::new);
+        Ok(Self { columns, before, extent, reach, margin, cuts, halo, boundary })
     }
 
     /// Particles of each rank, shape \[ranks\].
@@ -183,7 +206,7 @@ impl Parting {
         debug_assert_eq!(exact_here.len(), self.particles(&exact));
         let first = self.before[owned.start] as usize - owned_here.start;
         body.part = Some(Part { first, total, owned: owned_here, exact: exact_here, whole });
-        Layout::of_part(scene, body, neighbours)
+        Layout::of_part(scene, (body, neighbours), self.boundary.clone())
     }
 }
 
@@ -200,6 +223,35 @@ fn columns_of(scene: &Scene) -> Result<Range<i32>, SceneError> {
 
 fn census(scene: &Scene, columns: Range<i32>) -> Result<Census, SceneError> {
     outlay(scene)?.count(columns).map_err(|error| refuse_body(scene, &error))
+}
+
+/// Whether something of a scene is on the boundary of the body's cells, or its outline is taken from that.
+fn is_along_outline(scene: &Scene) -> bool {
+    let is_by_count = matches!(scene.body, BodySource::Cut(Cut::Count { .. }));
+    let of_role = |entry: &RoleEntry| matches!(entry.region, SceneRegion::Outline(_));
+    scene.loads.iter().any(|load| matches!(load, Load::Outline { .. }))
+        || (scene.material.is_some() && is_by_count && scene.roles.iter().any(of_role))
+}
+
+/// The boundary of the cells whose first corner is in some columns, in their order; nothing where nothing is on it.
+fn sides(scene: &Scene, columns: Range<i32>) -> Result<Vec<[Corner; 2]>, SceneError> {
+    if !is_along_outline(scene) || columns.is_empty() {
+        return Ok(Vec::new());
+    }
+    let outlay = outlay(scene)?;
+    let refuse = |error| refuse_body(scene, &error);
+    // Corners are a cell's width away, and so are the cells that decide on them.
+    let far = outlay.reach().map_err(refuse)? + 2 * cell_width(&templates(&scene.lattice));
+    let (body, _) = outlay.lay_out(Some(columns.start - far..columns.end + far)).map_err(refuse)?;
+    let cells = Cells::of_body(&body);
+    let begin = |column: i32| body.sites.partition_point(|site| site[0] < column);
+    let own = cells.before(begin(columns.start))..cells.before(begin(columns.end));
+    let corner = |i: u32| {
+        let [column, row] = body.sites[i as usize];
+        [column, (i as usize - begin(column)) as i32, row]
+    };
+    let sides = cells.boundary_sides_of(own, &cells.incidence(body.count()));
+    Ok(sides.into_iter().map(|side| side.map(corner)).collect())
 }
 
 /// The first rank's caches: halos are measured by them.

@@ -7,7 +7,8 @@ use crate::flock::body::{Body, BodyError, Part};
 use crate::flock::neighbourhood::Neighbours;
 use crate::geometry::disjoint_sets::DisjointSets;
 use crate::material::cells::{Cells, Incidence};
-use crate::material::mechanism::{Hinge, Linkage, joined_cells};
+use crate::material::mechanism::{HeldPlace, Hinge, Hold, Linkage, Mechanism, joined_cells};
+
 use crate::ranks::Team;
 
 /// Pieces that particles, or cells, of all ranks make up.
@@ -146,4 +147,59 @@ pub fn linkage(body: &Body, (cells, incidence): (&Cells, &Incidence), team: &Tea
         rest = after;
     }
     (part, Linkage { corners, hinges })
+}
+
+/// Refuses a body that the `held` components of its particles do not keep from moving, shape \[count\]\[x, y\], as
+/// [`require_held`](crate::material::mechanism::require_held) does; for all ranks together, which have found how its parts are
+/// linked.
+///
+/// # Errors
+/// On all ranks alike.
+pub fn require_held(
+    body: &Body,
+    incidence: &Incidence,
+    (part, linkage): (&[usize], &Linkage),
+    held: &[[bool; 2]],
+    team: &Team,
+) -> Result<(), Mechanism> {
+    let groups = linkage.groups();
+    let group_of = |i: usize| incidence.of(i).first().map(|&cell| groups[part[cell as usize]]);
+    let mut holds = vec![Hold::NONE; groups.len()];
+    for i in body.owned() {
+        if let Some(group) = group_of(i) {
+            holds[group] = holds[group].with(body.first() + i, held[i]);
+        }
+    }
+    let words: Vec<u64> =
+        holds.iter().flat_map(|hold| [hold.first, hold.held, hold.whole]).map(|n| n as u64).collect();
+    let all = team.gather_all(&words);
+    let mut holds = vec![Hold::NONE; groups.len()];
+    for (k, of) in all.chunks_exact(3).enumerate() {
+        let hold = &mut holds[k % groups.len()];
+        let [first, held, whole] = [of[0], of[1], of[2]].map(|n| n as usize);
+        *hold = Hold { first: hold.first.min(first), held: hold.held + held, whole: hold.whole + whole };
+    }
+    // Places, each with a number.
+    let gathered = |own: &mut dyn Iterator<Item = (usize, u64)>| -> Vec<([f64; 2], u64)> {
+        let words = |(i, number): (usize, u64)| {
+            let [x, y] = body.reference.get(i).map(f64::to_bits);
+            [x, y, number]
+        };
+        let all = team.gather_all(&own.flat_map(words).collect::<Vec<_>>());
+        all.chunks_exact(3).map(|of| ([f64::from_bits(of[0]), f64::from_bits(of[1])], of[2])).collect()
+    };
+    let members = |group: usize| -> Vec<HeldPlace> {
+        let own = body.owned().filter(|&i| held[i] != [false; 2] && group_of(i) == Some(group));
+        let axes = |i: usize| u64::from(held[i][0]) | u64::from(held[i][1]) << 1;
+        let all = gathered(&mut own.map(|i| (i, axes(i))));
+        all.into_iter().map(|(place, axes)| (place, [axes & 1 == 1, axes & 2 == 2])).collect()
+    };
+    let grounded = || {
+        let own = body.owned().filter(|&i| held[i] == [true; 2]);
+        let cells =
+            own.flat_map(|i| incidence.of(i).iter().map(move |&cell| (i, part[cell as usize] as u64)));
+        let all = gathered(&mut { cells });
+        all.into_iter().map(|(place, part)| (place, part as usize)).collect()
+    };
+    linkage.require_held(body.bounds(), &holds, members, grounded)
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::damping::along_outline;
 use super::layout::{Layout, ReferenceMotion, held_components, no_particle, refuse_pieces};
 use super::parts::{Parting, agreed};
-use super::pieces::{linkage, require_connected};
+use super::pieces::{linkage, require_connected, require_held};
 use super::{places, weights};
 use crate::engine::probes::ProbeSeries;
 use crate::engine::setup::{Conduct, RoleChange, Setup, of_first_roles};
@@ -21,7 +21,7 @@ use crate::flock::rules::{Axis, Mean, Poisson, Rule};
 use crate::flock::vectors::{Vectors, distance};
 use crate::geometry::outline::Outline;
 use crate::material::free_edge::FreeEdge;
-use crate::material::mechanism::require_held;
+use crate::material::mechanism::{self, Mechanism};
 use crate::material::outline_loads::{Load, Resultant, sum};
 use crate::material::weights::WeightsError;
 use crate::ranks::Team;
@@ -42,7 +42,7 @@ pub struct Plan {
     pub probes: Vec<usize>,
     /// The outline of the body's shape, where it has one.
     pub outline: Option<Outline>,
-    /// Of each load of the scene, in its order.
+    /// Of each load of the scene, in its order; of a part nothing.
     pub resultants: Vec<Resultant>,
 }
 
@@ -85,10 +85,18 @@ impl Plan {
         let connected = require_connected(&layout.body, &layout.neighbours, team);
         connected.map_err(|error| refuse_pieces(scene, &error))?;
         let changes = agreed(scene, team, layout.role_changes(scene, None))?;
+        let owned = layout.body.owned();
+        let is_anywhere = |own: bool, key: String| {
+            if team.any(own) { Ok(()) } else { Err(layout.holds_none(scene, &format!("{key}.region"))) }
+        };
         for (k, change) in changes.iter().enumerate() {
-            let owned = layout.body.owned();
-            if !team.any(change.particles.iter().any(|i| owned.contains(i))) {
-                return Err(layout.holds_none(scene, &format!("roles[{k}].region")));
+            is_anywhere(change.particles.iter().any(|i| owned.contains(i)), format!("roles[{k}]"))?;
+        }
+        let loads = agreed(scene, team, layout.loads(scene))?;
+        for (k, load) in loads.iter().enumerate() {
+            if let Load::Particles { particles, .. } = load {
+                let own = particles.iter().any(|&i| owned.contains(&(i as usize)));
+                is_anywhere(own, format!("loads[{k}]"))?;
             }
         }
         let mut plan = agreed(scene, team, Self::of_roles(scene, layout, changes))?;
@@ -104,12 +112,16 @@ impl Plan {
         Ok(plan)
     }
 
-    /// Refuses a material whose cells can move against each other.
+    /// Refuses a material whose cells can move against each other, or all of them under a load.
     fn require_held_together(&self, scene: &Scene, team: &Team) -> Result<(), SceneError> {
-        let Setup { body, cells, .. } = &self.setup;
+        let Setup { body, flock, cells, changes, .. } = &self.setup;
         let (Some(cells), Mean::Material { .. }) = (cells, scene.mean) else { return Ok(()) };
         let incidence = cells.incidence(body.count());
-        let (_, linkage) = linkage(body, (cells, &incidence), team);
+        let (part, linkage) = linkage(body, (cells, &incidence), team);
+        if flock.forces.is_some() {
+            let held = require_held(body, &incidence, (&part, &linkage), &held_axes(body, changes), team);
+            held.map_err(|mechanism| refuse_loose(scene, &mechanism))?;
+        }
         let rigid = linkage.require_rigid(body.bounds());
         rigid.map_err(|mechanism| weights::refuse(scene, &WeightsError::Mechanism(mechanism)))
     }
@@ -117,7 +129,11 @@ impl Plan {
     /// Keeps rest offsets if any particle of the body needs one: those that stand at the ends of a part alone do.
     fn agree_on_rest(&mut self, team: &Team) {
         let Setup { body, flock, .. } = &mut self.setup;
-        let is_needed = |rest: &Vectors| body.owned().any(|i| rest.get(i) != [0.0; 2]);
+        let is_held = |i: usize| match &flock.weights {
+            Weights::Matrix(weights) => weights.held(i) != [false; 2],
+            _ => false,
+        };
+        let is_needed = |rest: &Vectors| body.owned().any(|i| rest.get(i) != [0.0; 2] || is_held(i));
         let is_needed = team.any(flock.rest.as_ref().is_some_and(is_needed));
         flock.rest = flock.rest.take().or_else(|| Some(Vectors::zeros(body.count()))).filter(|_| is_needed);
     }
@@ -138,7 +154,8 @@ impl Plan {
         let actions = actions(scene, &layout, &changes)?;
         let Layout { body, neighbours, cells, outline, .. } = layout;
         let Following { weights, forces, update, loads, free_edge } = following;
-        let resultants = loads.iter().map(|f| Resultant::of(body.reference.iter().zip(f.iter()))).collect();
+        let resultant = |load: &Vectors| Resultant::of(body.reference.iter().zip(load.iter()));
+        let resultants = loads.iter().filter(|_| body.part.is_none()).map(resultant).collect();
         let flock = flock(scene, &body, neighbours, weights, forces);
         let roles = body.is_frame.iter().map(|&f| if f { Role::Frame } else { Role::Follower }).collect();
         let (low, high) = body.bounds();
@@ -331,7 +348,8 @@ fn require_carried(
 ) -> Result<(), SceneError> {
     let (Some(cells), Some(forces)) = (&layout.cells, forces) else { return Ok(()) };
     if !matches!(scene.mean, Mean::Material { .. }) {
-        let Some(i) = (0..leads.len()).find(|&i| leads[i] != [true; 2] && forces.get(i) != [0.0; 2]) else {
+        let Some(i) = layout.body.owned().find(|&i| leads[i] != [true; 2] && forces.get(i) != [0.0; 2])
+        else {
             return Ok(());
         };
         let message =
@@ -340,14 +358,18 @@ fn require_carried(
             "use rule.mean.kind = \"material\", or load leaders alone (which steers the truth they follow)";
         return Err(scene.refuse("loads", message, help));
     }
+    // For all parts to find out.
+    if layout.body.part.is_some() {
+        return Ok(());
+    }
     let incidence = cells.incidence(layout.body.count());
-    require_held(cells, &incidence, &layout.body.reference, leads).map_err(|mechanism| {
-        scene.refuse(
-            "roles",
-            mechanism.to_string(),
-            "clamp or lead at least two particles of every part, or components that keep it from moving",
-        )
-    })
+    let held = mechanism::require_held(cells, &incidence, &layout.body.reference, leads);
+    held.map_err(|mechanism| refuse_loose(scene, &mechanism))
+}
+
+fn refuse_loose(scene: &Scene, mechanism: &Mechanism) -> SceneError {
+    let help = "clamp or lead at least two particles of every part, or components that keep it from moving";
+    scene.refuse("roles", mechanism.to_string(), help)
 }
 
 /// Takes held components out of the rule: the particles keep them, and what is left of their weights moves the other

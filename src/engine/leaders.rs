@@ -115,16 +115,21 @@ impl Engine {
 
     /// Whether the motion of a single component goes on after this step.
     pub(super) fn moves_components(&self) -> bool {
-        self.led_components.iter().any(|(led, _)| self.goes_on(led))
+        // By the changes: of a body in parts the particles may all be on other ranks.
+        (0..self.changes.len()).any(|k| self.changes[k].axis.is_some() && self.motion_goes_on(k, 0))
     }
 
     /// Whether a leader's motion goes on after this step.
     pub(super) fn goes_on(&self, led: &Led) -> bool {
-        let duration = self.changes[led.change].motion.as_ref().map(|motion| motion.duration());
+        self.motion_goes_on(led.change, led.since)
+    }
+
+    fn motion_goes_on(&self, change: usize, since: usize) -> bool {
+        let duration = self.changes[change].motion.as_ref().map(|motion| motion.duration());
         match duration {
             None => false,
             Some(None) => true,
-            Some(Some(duration)) => led.since + duration > self.step,
+            Some(Some(duration)) => since + duration > self.step,
         }
     }
 

@@ -243,19 +243,13 @@ impl Outlay<'_> {
         Ok(reach(&self.shell(&self.neighbourhood.offsets(self.lattice)?))[0].max(1))
     }
 
-    /// Grid columns that a cell is wide.
-    pub fn cell_width(&self) -> i32 {
-        let columns = self.cells.iter().flatten().map(|corner| corner[0]);
-        columns.clone().max().unwrap_or(0) - columns.min().unwrap_or(0)
-    }
-
     /// Counts the particles of some columns of the body.
     ///
     /// # Errors
     /// As [`Outlay::columns`], and more columns than can be looked at together.
     pub fn count(&self, columns: Range<i32>) -> Result<Census, BodyError> {
         let offsets = self.neighbourhood.offsets(self.lattice)?;
-        let far = self.reach()? + self.cell_width();
+        let far = self.reach()? + cell_width(&self.cells);
         let map = self.map(&self.shell(&offsets), Some(columns.start - far..columns.end + far))?;
         let mut census = Census { counts: vec![0; columns.len()], extent: Extent::NONE };
         for cell in (0..map.cells.len()).filter(|&cell| map.cells[cell] != NOTHING) {
@@ -487,6 +481,12 @@ impl Body {
         }
         parts.labels()
     }
+}
+
+/// Grid columns that the widest of these cells is wide, at least; 0 of none.
+pub fn cell_width(cells: &[Vec<Site>]) -> i32 {
+    let columns = cells.iter().flatten().map(|corner| corner[0]);
+    columns.clone().max().unwrap_or(0) - columns.min().unwrap_or(0)
 }
 
 /// Farthest column and row any offset reaches.

@@ -4,6 +4,7 @@
 //! hexagonal one triangles, the honeycomb its hexagons. A cell exists where all its
 //! corners are particles of the body; the frame, which stands for the world outside, has no cells.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
@@ -13,8 +14,9 @@ use crate::flock::lattice::{Lattice, LatticeKind, Site, ring};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::vectors::Vectors;
 
+use super::boundary::{Boundary, ways};
 use super::elastic::Elastic;
-use super::stiffness::{ShapeError, area, centroid, cut_load_shares, element_of, load_shares, mean_strain};
+use super::stiffness::{ShapeError, centroid, cut_load_shares, element_of, load_shares, mean_strain};
 use crate::geometry::outline::{Outline, OutlineError};
 
 /// Cells of any polygons, in compressed form. Corners run counter-clockwise.
@@ -281,29 +283,24 @@ impl Cells {
 
     /// Sides that belong to one cell only, the body to the left of each, in the order of cells.
     pub fn boundary_sides(&self, incidence: &Incidence) -> Vec<[u32; 2]> {
-        let sides = (0..self.count()).flat_map(|cell| self.sides(cell));
+        self.boundary_sides_of(0..self.count(), incidence)
+    }
+
+    /// The same of some cells.
+    pub fn boundary_sides_of(&self, cells: Range<usize>, incidence: &Incidence) -> Vec<[u32; 2]> {
+        let sides = cells.flat_map(|cell| self.sides(cell));
         sides.filter(|&side| self.across(incidence, side).is_none()).collect()
     }
 
     /// The ways around the body and its holes, each from a particle back to it, the body to the left, shape
     /// \[ways\]\[particles + 1\].
     pub fn boundary_ways(&self, particles: usize) -> Vec<Vec<u32>> {
-        let mut onwards: Vec<Vec<u32>> = vec![Vec::new(); particles];
-        for [a, b] in self.boundary_sides(&self.incidence(particles)) {
-            onwards[a as usize].push(b);
-        }
-        let mut ways = Vec::new();
-        for start in 0..particles {
-            while let Some(mut here) = onwards[start].pop() {
-                let mut way = vec![start as u32, here];
-                while let Some(next) = onwards[here as usize].pop() {
-                    way.push(next);
-                    here = next;
-                }
-                ways.push(way);
-            }
-        }
-        ways
+        let sides = self.boundary_sides(&self.incidence(particles));
+        let ways = ways(sides.iter().map(|side| side.map(|i| i as usize)));
+        let start = |way: &Vec<usize>| way.first().map(|&side| sides[side][0]);
+        let particles =
+            |way: &Vec<usize>| start(way).into_iter().chain(way.iter().map(|&side| sides[side][1])).collect();
+        ways.iter().map(particles).collect()
     }
 
     /// The outline of the cells, sides in one line taken for one edge.
@@ -311,26 +308,7 @@ impl Cells {
     /// # Errors
     /// Cells that hang together by a corner, or in several parts, have no outline.
     pub fn outline(&self, reference: &Vectors) -> Result<Outline, OutlineError> {
-        let straight = |way: &Vec<u32>| {
-            let at = |k: usize| reference.get(way[k % (way.len() - 1)] as usize);
-            let turns = |&k: &usize| {
-                let (a, b, c) = (at(k + way.len() - 2), at(k), at(k + 1));
-                let (u, v) = ([b[0] - a[0], b[1] - a[1]], [c[0] - b[0], c[1] - b[1]]);
-                let turn = u[0] * v[1] - u[1] * v[0];
-                turn.abs() > 1e-9 * u[0].hypot(u[1]) * v[0].hypot(v[1])
-            };
-            (0..way.len() - 1).filter(turns).map(at).collect::<Vec<_>>()
-        };
-        let mut polygons: Vec<Vec<[f64; 2]>> =
-            self.boundary_ways(reference.len()).iter().map(straight).collect();
-        // The outer one is the largest, which bounds all others.
-        let size = |polygon: &Vec<[f64; 2]>| if polygon.len() < 3 { 0.0 } else { area(polygon).abs() };
-        let outer = (0..polygons.len()).max_by(|&a, &b| size(&polygons[a]).total_cmp(&size(&polygons[b])));
-        polygons.swap(0, outer.unwrap_or(0));
-        if polygons.is_empty() {
-            return Err(OutlineError::NoArea { ring: 0, place: [0.0; 2] });
-        }
-        Outline::of_polygons(&polygons)
+        Boundary::of(self, reference).outline()
     }
 
     /// Mean strain of each cell (xx, yy, engineering xy) \[1\] under these displacements \[length\], shape

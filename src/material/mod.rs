@@ -21,6 +21,7 @@
 //! * [`elastic`]: engineering constants, refused where no stable material has them, to the 3x3
 //!   stiffness of the sheet.
 //! * [`cells`]: the cells of a body: rectangles, triangles or hexagons between its particles.
+//! * [`boundary`]: the sides along the edge of the cells, and the outline that they make.
 //! * [`fit`]: bodies whose outline is kept: cells that the shape cuts, along it.
 //! * [`stiffness`]: what one cell resists: bilinear quadrilateral, constant-strain triangle, and the
 //!   lowest-order virtual element for any polygon.
@@ -56,6 +57,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod boundary;
 pub mod cells;
 pub mod dilatation;
 pub mod elastic;

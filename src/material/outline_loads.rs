@@ -7,6 +7,7 @@
 
 use std::collections::HashMap;
 
+use super::boundary::Boundary;
 use super::cells::Cells;
 use crate::flock::body::Body;
 use crate::flock::vectors::Vectors;
@@ -157,13 +158,18 @@ pub struct Loader<'a> {
     body: &'a Body,
     /// The outline of the body's shape; only loads on it need one.
     outline: Option<&'a Outline>,
-    sides: SideGrid,
+    sides: SideGrid<'a>,
 }
 
 impl<'a> Loader<'a> {
-    /// `outline` is that of the body's shape; only loads on it need one.
-    pub fn new(cells: &'a Cells, body: &'a Body, outline: Option<&'a Outline>) -> Self {
-        Self { cells, body, outline, sides: SideGrid::new(cells, &body.reference, body.lattice.spacing()) }
+    /// `outline` is that of the body's shape, and `boundary` that of its cells, of the whole body where this is a part of one; only
+    /// loads along the outline need them.
+    pub fn new(
+        cells: &'a Cells,
+        body: &'a Body,
+        (outline, boundary): (Option<&'a Outline>, &'a Boundary),
+    ) -> Self {
+        Self { cells, body, outline, sides: SideGrid::new(boundary, body.lattice.spacing()) }
     }
 
     /// Adds the forces of a load to those on the particles \[force\], shape \[count\].
@@ -204,16 +210,22 @@ impl<'a> Loader<'a> {
             None => (Vec::new(), 0.25 * spacing),
         };
         for (point, force) in load.forces(outline, &breaks, grain) {
-            let side = self.sides.nearest(point, &self.body.reference).ok_or(LoadError::NoBoundary)?;
+            let side = self.sides.nearest(point).ok_or(LoadError::NoBoundary)?;
             self.attach(point, force, side, forces);
         }
         Ok(())
     }
 
     /// Replaces a force at a point \[length\] by forces on the ends of a side: shares of it where the point's foot is on
-    /// the side, and a couple across the side for what that leaves of the moment.
-    fn attach(&self, point: [f64; 2], force: [f64; 2], [a, b]: [u32; 2], forces: &mut Vectors) {
-        let (from, to) = (self.body.reference.get(a as usize), self.body.reference.get(b as usize));
+    /// the side, and a couple across the side for what that leaves of the moment. Of a part, those that it has as in the whole.
+    fn attach(&self, point: [f64; 2], force: [f64; 2], side: usize, forces: &mut Vectors) {
+        let Boundary { ends, places } = self.sides.boundary;
+        let ([a, b], [from, to]) = (ends[side], places[side]);
+        let mut push = |index: usize, force: [f64; 2]| {
+            if let Some(particle) = self.body.exact_particle(index) {
+                push(forces, particle as u32, force);
+            }
+        };
         let along = [0, 1].map(|k| to[k] - from[k]);
         let square = along[0] * along[0] + along[1] * along[1];
         let off = [0, 1].map(|k| point[k] - from[k]);
@@ -222,8 +234,8 @@ impl<'a> Loader<'a> {
         let moment = arm[0] * force[1] - arm[1] * force[0];
         // A force c across the side at its end and -c at its beginning have the moment |c| times the length.
         let couple = [-along[1], along[0]].map(|n| n * moment / square);
-        push(forces, a, [0, 1].map(|k| (1.0 - t) * force[k] - couple[k]));
-        push(forces, b, [0, 1].map(|k| t * force[k] + couple[k]));
+        push(a, [0, 1].map(|k| (1.0 - t) * force[k] - couple[k]));
+        push(b, [0, 1].map(|k| t * force[k] + couple[k]));
     }
 }
 
@@ -245,19 +257,17 @@ fn push(forces: &mut Vectors, particle: u32, [x, y]: [f64; 2]) {
 
 /// Sides of the cells' boundary in square buckets.
 #[derive(Debug)]
-struct SideGrid {
+struct SideGrid<'a> {
     /// \[length\]
     bucket: f64,
-    sides: Vec<[u32; 2]>,
+    boundary: &'a Boundary,
     buckets: HashMap<[i64; 2], Vec<u32>>,
 }
 
-impl SideGrid {
-    fn new(cells: &Cells, reference: &Vectors, bucket: f64) -> Self {
-        let sides = cells.boundary_sides(&cells.incidence(reference.len()));
-        let mut grid = Self { bucket, sides, buckets: HashMap::new() };
-        for (number, side) in grid.sides.iter().enumerate() {
-            let [a, b] = side.map(|i| reference.get(i as usize));
+impl<'a> SideGrid<'a> {
+    fn new(boundary: &'a Boundary, bucket: f64) -> Self {
+        let mut grid = Self { bucket, boundary, buckets: HashMap::new() };
+        for (number, &[a, b]) in boundary.places.iter().enumerate() {
             let low = grid.key([0, 1].map(|k| a[k].min(b[k])));
             let high = grid.key([0, 1].map(|k| a[k].max(b[k])));
             for key in (low[0]..=high[0]).flat_map(|i| (low[1]..=high[1]).map(move |j| [i, j])) {
@@ -271,8 +281,8 @@ impl SideGrid {
         p.map(|v| (v / self.bucket).floor() as i64)
     }
 
-    /// The side nearest to a point \[length\].
-    fn nearest(&self, p: [f64; 2], reference: &Vectors) -> Option<[u32; 2]> {
+    /// The number of the side nearest to a point \[length\].
+    fn nearest(&self, p: [f64; 2]) -> Option<usize> {
         let [i, j] = self.key(p);
         let mut best: Option<(f64, u32)> = None;
         // Ring by ring: what is in a farther ring is farther than what a nearer one has.
@@ -283,7 +293,7 @@ impl SideGrid {
             let ring = (-reach..=reach).flat_map(|di| (-reach..=reach).map(move |dj| [di, dj]));
             for [di, dj] in ring.filter(|[di, dj]| di.abs().max(dj.abs()) == reach) {
                 for &number in self.buckets.get(&[i + di, j + dj]).into_iter().flatten() {
-                    let [a, b] = self.sides[number as usize].map(|i| reference.get(i as usize));
+                    let [a, b] = self.boundary.places[number as usize];
                     let apart = segment_distance(p, a, b);
                     if best.is_none_or(|(near, known)| (apart, number) < (near, known)) {
                         best = Some((apart, number));
@@ -291,7 +301,7 @@ impl SideGrid {
                 }
             }
         }
-        best.map(|(_, number)| self.sides[number as usize])
+        best.map(|(_, number)| number as usize)
     }
 }
 
@@ -341,7 +351,8 @@ mod tests {
         for kind in LatticeKind::SAMPLES {
             for fitted in [true, false] {
                 let (body, cells, outline) = body(kind, fitted);
-                let loader = Loader::new(&cells, &body, Some(&outline));
+                let boundary = Boundary::of(&cells, &body.reference);
+                let loader = Loader::new(&cells, &body, (Some(&outline), &boundary));
                 let add = |selection: Selection, push: Push, profile: Option<Profile>| {
                     let portions = outline.portions(&selection, 1e-9);
                     let mut forces = Vectors::zeros(body.count());
@@ -386,7 +397,8 @@ mod tests {
                 let (body, cells, outline) = body(kind, fitted);
                 let total: f64 = cells.kind.iter().map(|&k| area(&cells.shapes[k as usize])).sum();
                 let mut forces = Vectors::zeros(body.count());
-                let loader = Loader::new(&cells, &body, Some(&outline));
+                let boundary = Boundary::of(&cells, &body.reference);
+                let loader = Loader::new(&cells, &body, (Some(&outline), &boundary));
                 loader.add(&Load::Body([0.0, -3.0]), &mut forces).expect("fits");
                 let found = resultant(&forces, &body);
                 assert!((found.force[1] + 3.0 * total).abs() < 1e-11 * total, "{kind:?}");
@@ -399,7 +411,9 @@ mod tests {
     fn loads_on_what_is_not_there_are_refused() {
         let (body, mut cells, outline) = body(LatticeKind::Square { spacing: 1.0 }, true);
         let add = |cells: &Cells, load: &Load| {
-            Loader::new(cells, &body, Some(&outline)).add(load, &mut Vectors::zeros(body.count()))
+            let boundary = Boundary::of(cells, &body.reference);
+            Loader::new(cells, &body, (Some(&outline), &boundary))
+                .add(load, &mut Vectors::zeros(body.count()))
         };
         let push = |force: f64| Load::Particles { particles: vec![0], force: [force, 0.0] };
         assert_eq!(add(&cells, &push(f64::NAN)), Err(LoadError::NotFinite));

@@ -6,6 +6,7 @@ use flockform::flock::vectors::Vectors;
 use flockform::geometry::outline::Outline;
 use flockform::geometry::portion::Selection;
 use flockform::geometry::shape::Shape;
+use flockform::material::boundary::Boundary;
 use flockform::material::cells::{Cells, neighbourhood, without_loose_sites};
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::material::fit::{Fitted, LEAST_AREA, LEAST_SIDE, LEAST_WIDTH, fit};
@@ -84,7 +85,8 @@ fn left_of_uniform_stress(noise: &mut Noise, kind: LatticeKind, round: usize) ->
     assert!(quality.width > LEAST_WIDTH - 1e-9, "{label}: {quality:?}");
 
     // The tractions of a uniform stress on every piece balance the stiffness of the uniform strain everywhere.
-    let loader = Loader::new(&cells, &body, Some(&outline));
+    let boundary = Boundary::of(&cells, &body.reference);
+    let loader = Loader::new(&cells, &body, (Some(&outline), &boundary));
     let mut loads = Vectors::<f64>::zeros(body.count());
     for (ring, pieces) in outline.rings().iter().enumerate() {
         for piece in pieces {

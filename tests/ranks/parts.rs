@@ -10,7 +10,10 @@ use flockform::continuum::run::{run_shared, run_watched};
 use flockform::engine::Engine;
 use flockform::engine::observer::EachStep;
 use flockform::engine::probes::ProbeSeries;
+use flockform::engine::setup::Setup;
 use flockform::engine::state::EngineState;
+use flockform::flock::lattice::Site;
+use flockform::flock::law::Weights;
 use flockform::flock::vectors::Vectors;
 use flockform::material::stress::StressState;
 use flockform::scene::Scene;
@@ -37,12 +40,30 @@ fn kept_parts(scene: &Scene, step: usize, ranks: usize) -> Option<KeptParts> {
     Some((parts.into_iter().map(|(first, state, ..)| (first, state)).collect(), probes, residual))
 }
 
+/// Those that a part has exactly see what they see in the whole body, by the same weights, and are loaded alike.
+fn assert_as_in_the_whole(part: &Plan, whole: &Plan) {
+    let (first, [part, whole]) = (part.setup.body.first(), [part, whole].map(|plan| &plan.setup));
+    let force = |setup: &Setup, i: usize| setup.flock.forces.as_ref().map(|forces| forces.get(i));
+    let seen = |setup: &Setup, i: usize| -> Vec<Site> {
+        setup.flock.neighbours.of(i).iter().map(|&k| setup.body.sites[k as usize]).collect()
+    };
+    for i in part.body.exact() {
+        assert_eq!(seen(part, i), seen(whole, first + i), "particle {}", first + i + 1);
+        if let [Weights::Matrix(part), Weights::Matrix(whole)] = [&part.flock.weights, &whole.flock.weights] {
+            assert_eq!(part.of(i), whole.of(first + i));
+        }
+        assert_eq!(force(part, i), force(whole, first + i), "particle {}", first + i + 1);
+    }
+}
+
 /// The end of a body of which each rank has a part, put together.
 fn parted(scene: &Scene, every: usize, ranks: usize, from: Option<&KeptParts>) -> End {
     assert_eq!(laid_out_whole_for(scene), None);
-    let sum = digest(&planned(scene));
+    let whole = planned(scene);
+    let sum = digest(&whole);
     let ends = on_ranks(ranks, |team| {
         let mut plan = Plan::of_part(scene, &team).unwrap_or_else(|error| panic!("{error}"));
+        assert_as_in_the_whole(&plan, &whole);
         let (count, owned) = (plan.count(), plan.setup.body.owned());
         assert_eq!(digest_of_parts(&plan, &team), sum);
         let mut looks = Looks::every(if team.is_first() { every } else { 1 });
@@ -317,6 +338,62 @@ fn a_large_material_in_parts_too() {
     assert_scene_parted_the_same(&plate(PLATE, &sets), "large", 17);
 }
 
+#[test]
+fn loads_on_a_body_in_parts_are_those_on_one_laid_out_as_a_whole() {
+    let grid = "body={shape={kind=\"grid\",columns=24,rows=9}}";
+    let probes = "record.probes=[1,30,61,100]";
+    let released = "roles[1]={region={kind=\"edge\",side=\"top\"},role=\"clamped\",from=30}";
+    let pressure = "{kind=\"pressure\",region={kind=\"outline\",hole=1},pressure=9.0}";
+    let traction = "{kind=\"traction\",region={kind=\"edge\",side=\"top\",depth=4.0},traction=[2.0,7.0],\
+         profile={from=[0.0,0.0],to=[20.0,1.0],factors=[0.5,1.5]}}";
+    let force = "{kind=\"force\",region={kind=\"disc\",centre=[17.0,6.0],radius=2.0},force=[0.5,-1.5]}";
+    let weight = "{kind=\"body\",force=[0.1,-0.7]}";
+    let all = |loads: &[&str]| format!("loads=[{}]", loads.join(","));
+    let several = all(&[pressure, traction, force, weight]);
+    let of_grid = all(&["{kind=\"pressure\",region={kind=\"outline\"},pressure=3.0}", traction, weight]);
+    let of_ids =
+        all(&["{kind=\"traction\",region={kind=\"ids\",ids=[9,18,27,36,45,46]},traction=[0.0,5.0]}"]);
+    let inclusion = "body.inclusions=[{shape={kind=\"disc\",centre=[14.0,6.0],radius=3.1},\
+         material={kind=\"isotropic\",young=9000.0,poisson=0.2}}]";
+    let rotates = "rule.mean={kind=\"material\",rotation=\"corotated\"}";
+    let along = "roles[0].region={kind=\"outline\",pieces=[4]}";
+    let held = |side: &str, axis: &str| {
+        format!("{{region={{kind=\"edge\",side=\"{side}\",depth=1.5}},role=\"clamped\",axis=\"{axis}\"}}")
+    };
+    let rollers = format!("roles=[{},{}]", held("left", "x"), held("bottom", "y"));
+    // What holds them is then an offset of nothing.
+    let at_zero = rollers.replace(",depth=1.5", "");
+    let led = "{region={kind=\"edge\",side=\"right\",depth=1.5},role=\"leader\",axis=\"x\",\
+         motion={kind=\"keyframes\",frames=[{step=20,displacement=[0.8,0.0]}]}}";
+    let pulled = format!("roles=[{},{},{led}]", held("left", "x"), held("bottom", "y"));
+    let on_leaders =
+        all(&["{kind=\"force\",region={kind=\"edge\",side=\"right\",depth=2.0},force=[0.5,1.0]}"]);
+    let paper = ["rule.mean.kind=\"barycentre\"", "neighbours={kind=\"second\"}"];
+    for sets in [
+        &[&several[..]][..],
+        &[&several, released],
+        &[&several, "lattice={kind=\"hexagonal\",spacing=1.0}"],
+        &[&several, "lattice={kind=\"honeycomb\",spacing=1.0}"],
+        &[&several, "lattice={kind=\"oblique\",a=1.0,b=0.9,angle=70.0}"],
+        &[&several, inclusion, rotates],
+        &[&several, "material.poisson=0.49"],
+        &[grid, &of_grid],
+        &[grid, &of_grid, "lattice={kind=\"hexagonal\",spacing=1.0}"],
+        &[grid, &of_grid, along],
+        &[grid, along],
+        &[grid, &of_ids],
+        &[&rollers, &several],
+        &[grid, &rollers, &of_grid],
+        &[grid, &at_zero, &of_grid, rotates],
+        &[&pulled],
+        &[grid, &pulled],
+        &[grid, &pulled, &of_grid],
+        &[&paper[..], &[&on_leaders[..]]].concat(),
+    ] {
+        assert_scene_parted_the_same(&plate(PLATE, &[sets, &[probes]].concat()), &format!("{sets:?}"), 25);
+    }
+}
+
 /// What a scene is refused for as a whole and in parts, on every rank: something that says `what`.
 fn assert_refused_the_same(scene: &Scene, what: &str) {
     assert_eq!(laid_out_whole_for(scene), None);
@@ -340,8 +417,24 @@ fn a_material_in_parts_is_refused_for_what_it_is_refused_for_as_a_whole() {
     let apart = "body={outline=\"lattice\",shape={kind=\"rectangle\",max=[18,9]},\
          holes=[{kind=\"rectangle\",min=[8.5,-1],max=[9.5,10]}]}";
     let far = "neighbours={kind=\"within\",radius=2.9}";
+    let loads = |loads: &str| format!("loads=[{loads}]");
+    let weight = loads("{kind=\"body\",force=[0.1,-0.7]}");
+    let nowhere = loads("{kind=\"force\",region={kind=\"box\",min=[90,0],max=[95,9]},force=[1,0]}");
+    let off = loads("{kind=\"traction\",region={kind=\"box\",min=[90,0],max=[95,9]},traction=[1,0]}");
+    let plain = "body={outline=\"lattice\",shape={kind=\"rectangle\",max=[18,9]}}";
+    let at =
+        |role: &str| format!("roles=[{{region={{kind=\"edge\",side=\"left\"}},role=\"clamped\"{role}}}]");
+    let one = "roles=[{region={kind=\"ids\",ids=[100]},role=\"clamped\"}]";
+    let paper = ["rule.mean.kind=\"barycentre\"", "neighbours={kind=\"second\"}"];
     for (what, sets) in [
         ("like a hinge", &[&hinge[..]][..]),
+        ("like a hinge", &[&hinge, &weight, &at("")]),
+        ("no leader holds", &[&weight, "roles=[]"]),
+        ("at one particle only", &[&weight, one]),
+        ("can slide or turn", &[plain, &weight, &at(",axis=\"x\"")]),
+        ("no particle of the body lies", &[&nowhere]),
+        ("no part of the outline lies", &[&off]),
+        ("a rule without a stiffness", &[&paper[..], &[&weight]].concat()),
         ("no cell", &[&narrow]),
         ("no neighbours", &[few]),
         ("no chain of cells", &[apart, far]),
