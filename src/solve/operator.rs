@@ -88,7 +88,7 @@ pub enum OperatorError {
 pub struct Operator {
     pub(super) columns: Columns,
     pub(super) class: Vec<u32>,
-    pub(super) rows: Vec<Row>,
+    pub(super) rows: Rows,
     pub(super) follows: Vec<bool>,
     /// Vectors from a site to that of the next column and of the next row \[length\].
     pub(super) grid: [[f64; 2]; 2],
@@ -131,6 +131,7 @@ impl Operator {
         }
         let columns = Columns::new(sites.iter().copied(), |_| true);
         let outliers = Outliers { first: count, places: Vec::new() };
+        let rows = Rows::from(rows);
         let operator = Self { columns, class, rows, follows, grid, outliers, held_axes: Vec::new() };
         operator.check_rows()?;
         Ok(operator)
@@ -199,13 +200,8 @@ impl Operator {
     }
 
     /// The row of a follower.
-    pub fn row(&self, particle: usize) -> &Row {
-        &self.rows[self.class[particle] as usize]
-    }
-
-    /// The different rows.
-    pub fn rows(&self) -> &[Row] {
-        &self.rows
+    pub(crate) fn row(&self, particle: usize) -> RowRef<'_> {
+        self.rows.of(self.class[particle])
     }
 
     /// Two followers, counted from 0, of which the second does not feel the first as the first feels it;
@@ -222,7 +218,7 @@ impl Operator {
                     if !self.follows[other] || fits[class][e] == self.class[other] {
                         continue;
                     }
-                    if !self.see_each_other_alike(class, e, self.class[other] as usize) {
+                    if !self.see_each_other_alike(stretch.class, e, self.class[other]) {
                         return Some([stretch.start + k, other]);
                     }
                     fits[class][e] = self.class[other];
@@ -232,13 +228,14 @@ impl Operator {
         })
     }
 
-    fn see_each_other_alike(&self, class: usize, entry: usize, other: usize) -> bool {
-        let (offset, block) = self.rows[class].entries[entry];
+    fn see_each_other_alike(&self, class: u32, entry: usize, other: u32) -> bool {
+        let [row, other] = [class, other].map(|class| self.rows.of(class));
+        let (offset, block) = row.entries[entry];
         let back = [-offset[0], -offset[1]];
         let zero = Block::default();
-        let seen = self.rows[other].entries.iter().find(|(o, _)| *o == back).map_or(&zero, |(_, b)| b);
+        let seen = other.entries.iter().find(|(o, _)| *o == back).map_or(&zero, |(_, b)| b);
         let size = |block: &Block| block.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
-        let scale = size(&self.rows[class].diagonal).min(size(&self.rows[other].diagonal));
+        let scale = size(row.diagonal).min(size(other.diagonal));
         let expected = transposed(block);
         (0..4).all(|k| (seen[k / 2][k % 2] - expected[k / 2][k % 2]).abs() <= 1e-10 * scale)
     }
@@ -268,7 +265,7 @@ impl Operator {
                 let same = (start..end).take_while(|&i| self.follows[i] && self.class[i] == class);
                 let mut len = same.count();
                 firsts.clear();
-                for (offset, _) in &self.rows[class as usize].entries {
+                for (offset, _) in self.rows.of(class).entries {
                     let found = self.columns.find(add(site, *offset));
                     len = len.min(found.map_or(1, |(_, room)| room));
                     firsts.push(found.map(|(first, _)| first));
@@ -283,8 +280,8 @@ impl Operator {
     }
 
     fn check_rows(&self) -> Result<(), OperatorError> {
-        let finite = |row: &Row| {
-            let blocks = std::iter::once(&row.diagonal).chain(row.entries.iter().map(|(_, block)| block));
+        let finite = |row: RowRef<'_>| {
+            let blocks = std::iter::once(row.diagonal).chain(row.entries.iter().map(|(_, block)| block));
             blocks.flatten().flatten().all(|value| value.is_finite())
         };
         let finite: Vec<bool> = self.rows.iter().map(finite).collect();
@@ -294,7 +291,7 @@ impl Operator {
                 return Some(OperatorError::NotFinite { particle });
             }
             let lost = firsts.iter().position(Option::is_none)?;
-            let (offset, _) = self.rows[class as usize].entries[lost];
+            let (offset, _) = self.rows.of(class).entries[lost];
             Some(OperatorError::NoNeighbour { particle, offset })
         });
         refused.map_or(Ok(()), Err)

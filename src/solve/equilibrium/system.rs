@@ -91,9 +91,9 @@ impl System {
                 if matrix.class[i] == class {
                     continue;
                 }
-                let row = &operator.rows()[class as usize];
+                let row = operator.rows.of(class);
                 let site = [column, segment.row + matrix.columns.step() * k as i32];
-                for (offset, block) in &row.entries {
+                for (offset, block) in row.entries {
                     let Some(held) = self.held_part(operator.index_of(site, *offset)) else { continue };
                     let [x, y] = apply(block, held);
                     right.x[i] += x;
@@ -101,7 +101,7 @@ impl System {
                 }
                 let [x, y] = operator.held_axes(i);
                 let Some(held) = self.held_part(i).filter(|_| x || y) else { continue };
-                let [fx, fy] = apply(&row.diagonal, held);
+                let [fx, fy] = apply(row.diagonal, held);
                 right.x[i] = if x { 0.0 } else { right.x[i] - fx };
                 right.y[i] = if y { 0.0 } else { right.y[i] - fy };
             }

@@ -7,6 +7,7 @@
 
 use super::matrix::{Matrix, Run};
 use super::packs::PACK;
+use super::rows::RowRef;
 use crate::flock::block::{Block, inverse, transposed};
 use crate::flock::lanes::{InLanes, MEMORY, in_lanes};
 use crate::solve::field::{Real, VectorsRef};
@@ -24,7 +25,7 @@ const NARROWEST: usize = 4;
 pub struct RowCoefficients<T> {
     /// Where the blocks of each class begin, shape \[classes + 1\].
     starts: Vec<u32>,
-    /// By class: `D`, then `-K` of each entry, each by columns.
+    /// By class of a long run: `D`, then `-K` of each entry, each by columns.
     blocks: Vec<[T; 4]>,
     /// `D^-1` by class, by rows.
     inverse: Vec<[T; 4]>,
@@ -37,15 +38,18 @@ impl<T: Real> RowCoefficients<T> {
     pub fn new(matrix: &Matrix, scale: f64) -> Self {
         let mut stencils =
             Self { starts: vec![0], blocks: Vec::new(), inverse: Vec::new(), packed: Vec::new() };
-        let cast = |[[xx, xy], [yx, yy]]: Block, factor: f64| [xx, xy, yx, yy].map(|v| T::of(v * factor));
-        for row in matrix.rows.iter() {
-            stencils.blocks.push(cast(transposed(*row.diagonal), scale));
-            let others = row.entries.iter().map(|(_, block)| cast(transposed(*block), -scale));
-            stencils.blocks.extend(others);
+        let mut is_long = vec![false; matrix.rows.len()];
+        matrix.runs().iter().filter(|run| !run.is_packed()).for_each(|run| is_long[run.class as usize] = true);
+        stencils.inverse.reserve_exact(matrix.rows.len());
+        stencils.starts.reserve_exact(matrix.rows.len());
+        for (row, is_long) in matrix.rows.iter().zip(is_long) {
+            if is_long {
+                stencils.blocks.extend(blocks::<T>(row, scale));
+            }
             stencils.starts.push(stencils.blocks.len() as u32);
             stencils.inverse.push(cast(inverse(row.diagonal).unwrap_or_default(), 1.0 / scale));
         }
-        stencils.packed = matrix.packs.interleaved(|class| stencils.blocks(class));
+        stencils.packed = matrix.packs.interleaved(|class| blocks(matrix.rows.of(class), scale));
         stencils
     }
 
@@ -57,8 +61,8 @@ impl<T: Real> RowCoefficients<T> {
         self
     }
 
-    /// `D` and `-K` of each entry of a class, by columns.
-    pub fn blocks(&self, class: u32) -> &[[T; 4]] {
+    /// `D` and `-K` of each entry of a class, by columns; nothing of a class that no long run has.
+    fn blocks(&self, class: u32) -> &[[T; 4]] {
         &self.blocks[self.starts[class as usize] as usize..self.starts[class as usize + 1] as usize]
     }
 
@@ -66,6 +70,17 @@ impl<T: Real> RowCoefficients<T> {
     pub fn inverse(&self, class: u32) -> &[T; 4] {
         &self.inverse[class as usize]
     }
+}
+
+/// Entries of a block, one after the other.
+fn cast<T: Real>([[xx, xy], [yx, yy]]: Block, factor: f64) -> [T; 4] {
+    [xx, xy, yx, yy].map(|v| T::of(v * factor))
+}
+
+/// `D`, then `-K` of each entry of a row, each by columns and multiplied by `scale`.
+fn blocks<T: Real>(row: RowRef<'_>, scale: f64) -> impl Iterator<Item = [T; 4]> {
+    let others = row.entries.iter().map(move |(_, block)| cast(transposed(*block), -scale));
+    std::iter::once(cast(transposed(*row.diagonal), scale)).chain(others)
 }
 
 /// A computation that uses `K u`.
@@ -195,13 +210,7 @@ fn single<T: Real>(
     u: VectorsRef<'_, T>,
     task: &mut impl Task<T>,
 ) {
-    let [x, y] = product(blocks, distances, at, u);
-    task.take(at, inverse, &[x], &[y]);
-}
-
-/// `K u` of one particle: the products of a block side by side, and each summed by itself.
-#[inline(always)]
-pub fn product<T: Real>(blocks: &[[T; 4]], distances: &[i32], at: usize, u: VectorsRef<'_, T>) -> [T; 2] {
+    // The products of a block side by side, and each summed by itself.
     let mut sums = [T::default(); 4];
     for (block, &distance) in blocks.iter().zip(distances) {
         let from = at.wrapping_add_signed(distance as isize);
@@ -211,7 +220,25 @@ pub fn product<T: Real>(blocks: &[[T; 4]], distances: &[i32], at: usize, u: Vect
             sums[k] += block[k] * factors[k];
         }
     }
-    [sums[0] + sums[2], sums[1] + sums[3]]
+    task.take(at, inverse, &[sums[0] + sums[2]], &[sums[1] + sums[3]]);
+}
+
+/// `K u` of one particle.
+#[inline(always)]
+pub fn product(row: RowRef<'_>, distances: &[i32], at: usize, u: VectorsRef<'_, f64>) -> [f64; 2] {
+    let mut sums = [0.0; 4];
+    let mut add = |sign: f64, block: &Block, distance: i32| {
+        let from = at.wrapping_add_signed(distance as isize);
+        let factors = [u.x[from], u.y[from], u.x[from], u.y[from]];
+        for (k, value) in block.as_flattened().iter().enumerate() {
+            sums[k] += sign * value * factors[k];
+        }
+    };
+    add(1.0, row.diagonal, distances[0]);
+    for ((_, block), &distance) in row.entries.iter().zip(&distances[1..]) {
+        add(-1.0, block, distance);
+    }
+    [sums[0] + sums[1], sums[2] + sums[3]]
 }
 
 /// The `W` values from number `at` on.
@@ -256,22 +283,24 @@ mod tests {
         }
         assert!(wide.0.len() > 4000);
         assert!(wide.0 == portable.0);
-        let mut alone = Collect(Vec::new());
+        let mut alone: Vec<(usize, f64, f64)> = Vec::new();
+        let widen = |values: &[T]| values.iter().map(|v| v.wide()).collect();
+        let u = Vectors { x: widen(&u.x), y: widen(&u.y) };
         for run in matrix.runs() {
             for at in run.start as usize..(run.start + run.len) as usize {
-                let (blocks, inverse) = (stencils.blocks(run.class), stencils.inverse(run.class));
-                single(blocks, matrix.distances(run), inverse, at, u.view(), &mut alone);
+                let [x, y] = product(matrix.rows.of(run.class), matrix.distances(run), at, u.view());
+                alone.push((at, 0.7 * x, 0.7 * y));
             }
         }
         // Packs come after long runs.
         portable.0.sort_by_key(|one| one.0);
-        assert!(alone.0.len() == portable.0.len());
+        assert!(alone.len() == portable.0.len());
         let size = |component: fn(&(usize, T, T)) -> T| {
             portable.0.iter().map(|one| component(one).wide().abs()).fold(0.0, f64::max)
         };
         let rounding = rounding * f64::max(size(|one| one.1), size(|one| one.2));
-        for ((at, x, y), (here, wx, wy)) in alone.0.iter().zip(&portable.0) {
-            let off = f64::max((x.wide() - wx.wide()).abs(), (y.wide() - wy.wide()).abs());
+        for ((at, x, y), (here, wx, wy)) in alone.iter().zip(&portable.0) {
+            let off = f64::max((x - wx.wide()).abs(), (y - wy.wide()).abs());
             assert!(at == here && off <= rounding, "{at}: {off:e} of {rounding:e}");
         }
     }

@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use super::columns::Columns;
 use super::packs::Packs;
-use super::rows::Rows;
-use super::{Operator, Outliers, Row, Stretch, add};
+use super::rows::{RowRef, Rows};
+use super::{Operator, Outliers, Stretch, add};
 use crate::flock::block::Block;
 use crate::flock::body::Body;
 use crate::flock::lattice::Site;
@@ -131,9 +131,8 @@ impl Matrix {
     pub fn of_followers(operator: &Operator) -> Self {
         let columns = Columns::new(operator.columns.sites(), |i| operator.follows[i]);
         let mut class = vec![HELD; operator.count()];
-        let entries = operator.rows.iter().map(|row| row.entries.len()).max().unwrap_or_default();
-        let mut rows = Rows::with_capacity(operator.rows.len(), entries);
-        operator.rows.iter().for_each(|row| rows.push(row.diagonal, row.entries.iter().copied()));
+        let mut rows = Rows::with_capacity(operator.rows.len(), operator.rows.longest());
+        rows.extend(&operator.rows);
         let mut known = HashMap::new();
         // How many particles before each have something held.
         let mut held = vec![0u32];
@@ -158,7 +157,7 @@ impl Matrix {
                 let follows: Vec<bool> = firsts().map(|j| operator.follows[j + k]).collect();
                 class[start + k] =
                     *known.entry((full, free, follows)).or_insert_with_key(|(full, free, follows)| {
-                        push_without_held(&mut rows, &operator.rows[*full as usize], free, follows);
+                        push_without_held(&mut rows, operator.rows.of(*full), free, follows);
                         rows.len() as u32 - 1
                     });
             }
@@ -275,12 +274,12 @@ pub fn leads_to_outlier([columns, _]: Site) -> bool {
 /// Adds a row in unknown components alone: `free` are those of the particle itself and of each neighbour, of which only
 /// those that follow have a place in the matrix. A held component keeps its place on the diagonal and is moved by
 /// nothing.
-fn push_without_held(rows: &mut Rows, row: &Row, free: &[[bool; 2]], follows: &[bool]) {
+fn push_without_held(rows: &mut Rows, row: RowRef<'_>, free: &[[bool; 2]], follows: &[bool]) {
     let own = free[0];
     let keep = |block: &Block, other: [bool; 2]| -> Block {
         std::array::from_fn(|a| std::array::from_fn(|b| if own[a] && other[b] { block[a][b] } else { 0.0 }))
     };
-    let mut diagonal = keep(&row.diagonal, own);
+    let mut diagonal = keep(row.diagonal, own);
     for axis in (0..2).filter(|&axis| !own[axis]) {
         diagonal[axis][axis] = row.diagonal[axis][axis];
     }

@@ -76,7 +76,10 @@ impl Packs {
     }
 
     /// The blocks of the particles of all packs, lane by lane; nothing where a row has no more.
-    pub fn interleaved<'a, T: Real>(&self, blocks: impl Fn(u32) -> &'a [[T; 4]]) -> Vec<[[T; PACK]; 4]> {
+    pub fn interleaved<T: Real, B: Iterator<Item = [T; 4]>>(
+        &self,
+        blocks: impl Fn(u32) -> B,
+    ) -> Vec<[[T; PACK]; 4]> {
         let mut all = vec![[[T::default(); PACK]; 4]; self.read.len()];
         for pack in &self.packs {
             let of_pack = &mut all[pack.terms.start as usize..pack.terms.end as usize];

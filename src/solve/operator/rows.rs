@@ -3,6 +3,7 @@
 //! A body that fits its outline has thousands of them on every level of multigrid: to allocate each by itself takes longer
 //! than to add it up.
 
+use super::Row;
 use crate::flock::block::Block;
 use crate::flock::lattice::Site;
 
@@ -20,6 +21,14 @@ pub struct Rows {
     /// Where the entries of each end.
     ends: Vec<u32>,
     entries: Vec<(Site, Block)>,
+}
+
+impl From<Vec<Row>> for Rows {
+    fn from(list: Vec<Row>) -> Self {
+        let mut rows = Self::default();
+        list.into_iter().for_each(|row| rows.push(row.diagonal, row.entries));
+        rows
+    }
 }
 
 impl Rows {
@@ -66,18 +75,27 @@ impl Rows {
         }
     }
 
-    /// All rows of these, one after the other.
-    pub fn joined(pieces: &[Self]) -> Self {
-        let rows = pieces.iter().map(Self::len).sum();
-        let mut all = Self::with_capacity(rows, 0);
-        all.entries.reserve_exact(pieces.iter().map(|piece| piece.entries.len()).sum());
-        for piece in pieces {
-            let before = all.entries.len() as u32;
-            all.diagonals.extend(&piece.diagonals);
-            all.ends.extend(piece.ends.iter().map(|end| before + end));
-            all.entries.extend(&piece.entries);
-        }
+    /// All rows of these, one after the other; the first ones stay where they are if there is room.
+    pub fn joined(pieces: Vec<Self>) -> Self {
+        let entries: usize = pieces.iter().map(|piece| piece.entries.len()).sum();
+        let mut pieces = pieces.into_iter();
+        let mut all = pieces.next().unwrap_or_default();
+        all.entries.reserve_exact(entries - all.entries.len());
+        pieces.for_each(|piece| all.extend(&piece));
         all
+    }
+
+    /// Adds all rows of these.
+    pub fn extend(&mut self, others: &Self) {
+        let before = self.entries.len() as u32;
+        self.diagonals.extend_from_slice(&others.diagonals);
+        self.ends.extend(others.ends.iter().map(|end| before + end));
+        self.entries.extend_from_slice(&others.entries);
+    }
+
+    /// Most entries of a row.
+    pub fn longest(&self) -> usize {
+        self.iter().map(|row| row.entries.len()).max().unwrap_or_default()
     }
 
     /// The blocks of all rows, to be changed.

@@ -85,20 +85,22 @@ pub fn coarsen(fine: &Matrix, transfer: Transfer) -> (Matrix, OutlierShares) {
     // Neighbours share halves: those that are summed one after the other are to lie side by side.
     singles.sort_by_key(|(node, _)| *node);
     let patterns: Vec<&[u32]> = patterns.iter().collect();
-    let mut pieces = in_pieces(&patterns, PIECE, |patterns| {
-        let (mut rows, mut sums) = (Rows::with_capacity(patterns.len(), NEIGHBOURS), Sums::default());
-        for pattern in patterns {
-            galerkin(fine, &parents, pattern, &mut sums);
-            rows.push_blocks(sums.drain());
-        }
-        rows
-    });
-    nodes.extend((patterns.len() as u32..).zip(&singles).map(|(class, (node, _))| (*node, class)));
-    pieces.extend(in_pieces(&singles, PIECE, |singles| {
+    // Those along an outline are most of the rows: the others come after them.
+    nodes.iter_mut().for_each(|(_, class)| *class += singles.len() as u32);
+    nodes.extend(singles.iter().zip(0..).map(|((node, _), class)| (*node, class)));
+    let mut pieces = in_pieces(&singles, PIECE, |singles| {
         let (mut rows, mut sums) = (Rows::with_capacity(singles.len(), NEIGHBOURS), Sums::default());
         let mut halves = Halves::new(fine, &parents, &of_outliers);
         for (node, of_node) in singles {
             halves.add_row(*node, of_node, &mut sums);
+            rows.push_blocks(sums.drain());
+        }
+        rows
+    });
+    pieces.extend(in_pieces(&patterns, PIECE, |patterns| {
+        let (mut rows, mut sums) = (Rows::with_capacity(patterns.len(), NEIGHBOURS), Sums::default());
+        for pattern in patterns {
+            galerkin(fine, &parents, pattern, &mut sums);
             rows.push_blocks(sums.drain());
         }
         rows
@@ -108,7 +110,7 @@ pub fn coarsen(fine: &Matrix, transfer: Transfer) -> (Matrix, OutlierShares) {
     let columns = Columns::new(nodes.iter().map(|&(site, _)| site), |_| true);
     let shares = of_outliers.shares(&nodes);
     (
-        Matrix::compile(columns, nodes.into_iter().map(|(_, class)| class).collect(), Rows::joined(&pieces)),
+        Matrix::compile(columns, nodes.into_iter().map(|(_, class)| class).collect(), Rows::joined(pieces)),
         shares,
     )
 }
