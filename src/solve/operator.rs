@@ -16,9 +16,10 @@ pub mod samples;
 mod tests;
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 pub(crate) use columns::{Columns, Segment};
-pub(crate) use kernel::{RowCoefficients, Task, array, array_mut, pass, product};
+pub(crate) use kernel::{Particles, RowCoefficients, Task, pass, product};
 pub(crate) use matrix::{HELD, Matrix, leads_to_outlier};
 pub(crate) use rows::{RowRef, Rows};
 
@@ -33,6 +34,15 @@ pub struct Row {
     pub diagonal: Block,
     /// Offsets in columns and rows of sites, none of them zero and none twice.
     pub entries: Vec<(Site, Block)>,
+}
+
+impl Row {
+    fn divided_by(mut self, stiffness: f64) -> Self {
+        let blocks =
+            std::iter::once(&mut self.diagonal).chain(self.entries.iter_mut().map(|(_, block)| block));
+        blocks.flatten().flatten().for_each(|value| *value /= stiffness);
+        self
+    }
 }
 
 /// Why rows make no operator. Particles are named by their ids, which count from 1.
@@ -88,7 +98,11 @@ pub enum OperatorError {
 pub struct Operator {
     pub(super) columns: Columns,
     pub(super) class: Vec<u32>,
-    pub(super) rows: Rows,
+    /// Divided by the stiffness.
+    rows: Arc<Rows>,
+    /// The power of two near the largest stiffness that holds a particle back \[force / length\]: no square of one over- or
+    /// underflows, and no bit changes.
+    pub(crate) stiffness: f64,
     pub(super) follows: Vec<bool>,
     /// Vectors from a site to that of the next column and of the next row \[length\].
     pub(super) grid: [[f64; 2]; 2],
@@ -131,8 +145,12 @@ impl Operator {
         }
         let columns = Columns::new(sites.iter().copied(), |_| true);
         let outliers = Outliers { first: count, places: Vec::new() };
-        let rows = Rows::from(rows);
-        let operator = Self { columns, class, rows, follows, grid, outliers, held_axes: Vec::new() };
+        let diagonals = rows.iter().flat_map(|row| row.diagonal.as_flattened().iter().copied());
+        let stiffness = power_of_two(diagonals);
+        let rows =
+            Arc::new(Rows::from(rows.into_iter().map(|row| row.divided_by(stiffness)).collect::<Vec<_>>()));
+        let held_axes = Vec::new();
+        let operator = Self { columns, class, rows, stiffness, follows, grid, outliers, held_axes };
         operator.check_rows()?;
         Ok(operator)
     }
@@ -199,7 +217,7 @@ impl Operator {
         &self.follows
     }
 
-    /// The row of a follower.
+    /// The row of a follower, divided by the stiffness.
     pub(crate) fn row(&self, particle: usize) -> RowRef<'_> {
         self.rows.of(self.class[particle])
     }
@@ -305,6 +323,12 @@ pub(super) struct Stretch {
     pub start: usize,
     pub len: usize,
     pub class: u32,
+}
+
+/// The power of two nearest below the largest of these in size, as far as its inverse is a double too.
+pub(super) fn power_of_two(values: impl Iterator<Item = f64>) -> f64 {
+    let largest = values.fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    if largest == 0.0 { 1.0 } else { largest.log2().floor().clamp(-1020.0, 1020.0).exp2() }
 }
 
 pub(super) fn add(a: Site, b: Site) -> Site {

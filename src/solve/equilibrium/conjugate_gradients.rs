@@ -8,10 +8,9 @@ use super::history::History;
 use super::steps::{for_groups, for_own_groups};
 use super::system::Prepared;
 use super::{Found, Precision, Request, SolveError, Solver, steps};
-use crate::flock::block::Block;
 use crate::flock::vectors::Vectors;
 use crate::solve::field::{Real, VectorsMut, VectorsRef, dot};
-use crate::solve::operator::{Matrix, RowCoefficients};
+use crate::solve::operator::{Matrix, RowCoefficients, RowRef};
 use crate::solve::stopwatch::Stopwatch;
 
 /// An approximation of `K^-1`, symmetric and positive.
@@ -44,8 +43,8 @@ pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found,
 /// The inverse of the largest stiffness: in single precision the rows are scaled by it, so that neither
 /// pascals nor parts of them overflow.
 pub(super) fn single_scale(matrix: &Matrix) -> f64 {
-    let largest = |diagonal: &Block| diagonal[0][0].abs().max(diagonal[1][1].abs());
-    1.0 / matrix.rows.diagonals().iter().map(largest).fold(f64::MIN_POSITIVE, f64::max)
+    let largest = |row: RowRef<'_>| row.diagonal[0][0].abs().max(row.diagonal[1][1].abs());
+    1.0 / matrix.rows.iter().map(largest).fold(f64::MIN_POSITIVE, f64::max)
 }
 
 /// The whole iteration in single precision: right-hand side and rows scaled to about 1.

@@ -74,8 +74,7 @@ fn sweep(
 ) {
     for &(particle, run) in colour {
         let (i, run) = (particle as usize, &matrix.runs()[run as usize]);
-        let [load, felt] =
-            [f.get(i), product(matrix.rows.of(run.class), matrix.distances(run), i, u.view())];
+        let [load, felt] = [f.get(i), product(matrix.rows.of(run.class), matrix.distances(run), i, u.view())];
         let [x, y] = [load[0] - felt[0], load[1] - felt[1]];
         let [xx, xy, yx, yy] = stencils.inverse(run.class);
         u.x[i] += xx * x + xy * y;

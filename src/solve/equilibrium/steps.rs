@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::flock::vectors::Vectors;
 use crate::solve::field::{Real, VectorsMut, VectorsRef, dot};
-use crate::solve::operator::{Matrix, RowCoefficients, Task, array, array_mut, pass};
+use crate::solve::operator::{Matrix, Particles, RowCoefficients, Task, pass};
 
 /// Does some work on every group, in parallel where that pays; answers in the order of groups.
 pub fn for_groups<P: Send, R: Send>(groups: Vec<P>, work: impl Fn(usize, P) -> R + Sync) -> Vec<R> {
@@ -53,10 +53,9 @@ pub struct Apply<'a, T> {
 
 impl<T: Real> Task<T> for Apply<'_, T> {
     #[inline(always)]
-    fn take<const W: usize>(&mut self, at: usize, _: &[T; 4], x: &[T; W], y: &[T; W]) {
-        let at = at - self.out.begin;
-        *array_mut(self.out.x, at) = *x;
-        *array_mut(self.out.y, at) = *y;
+    fn take<const W: usize>(&mut self, particles: &impl Particles<T, W>, x: &[T; W], y: &[T; W]) {
+        particles.set(self.out.x, self.out.begin, *x);
+        particles.set(self.out.y, self.out.begin, *y);
     }
 }
 
@@ -68,17 +67,10 @@ pub struct Residual<'a, T> {
 
 impl<T: Real> Task<T> for Residual<'_, T> {
     #[inline(always)]
-    fn take<const W: usize>(&mut self, at: usize, _: &[T; 4], x: &[T; W], y: &[T; W]) {
-        let (fx, fy) = (array::<T, W>(self.f.x, at), array::<T, W>(self.f.y, at));
-        let at = at - self.out.begin;
-        let out = array_mut::<T, W>(self.out.x, at);
-        for k in 0..W {
-            out[k] = fx[k] - x[k];
-        }
-        let out = array_mut::<T, W>(self.out.y, at);
-        for k in 0..W {
-            out[k] = fy[k] - y[k];
-        }
+    fn take<const W: usize>(&mut self, particles: &impl Particles<T, W>, x: &[T; W], y: &[T; W]) {
+        let (fx, fy) = (particles.of(self.f.x), particles.of(self.f.y));
+        particles.set(self.out.x, self.out.begin, std::array::from_fn(|k| fx[k] - x[k]));
+        particles.set(self.out.y, self.out.begin, std::array::from_fn(|k| fy[k] - y[k]));
     }
 }
 
@@ -92,19 +84,17 @@ pub struct Smooth<'a, T> {
 
 impl<T: Real> Task<T> for Smooth<'_, T> {
     #[inline(always)]
-    fn take<const W: usize>(&mut self, at: usize, inverse: &[T; 4], x: &[T; W], y: &[T; W]) {
-        let [xx, xy, yx, yy] = inverse.map(|entry| entry * self.weight);
-        let (fx, fy) = (array::<T, W>(self.f.x, at), array::<T, W>(self.f.y, at));
-        let (ux, uy) = (array::<T, W>(self.u.x, at), array::<T, W>(self.u.y, at));
-        let at = at - self.out.begin;
-        let out = array_mut::<T, W>(self.out.x, at);
+    fn take<const W: usize>(&mut self, particles: &impl Particles<T, W>, x: &[T; W], y: &[T; W]) {
+        let (fx, fy) = (particles.of(self.f.x), particles.of(self.f.y));
+        let (ux, uy) = (particles.of(self.u.x), particles.of(self.u.y));
+        let (mut to_x, mut to_y) = ([T::default(); W], [T::default(); W]);
         for k in 0..W {
-            out[k] = ux[k] + (xx * (fx[k] - x[k]) + xy * (fy[k] - y[k]));
+            let [xx, xy, yx, yy] = [0, 1, 2, 3].map(|entry| particles.inverse(entry, k) * self.weight);
+            to_x[k] = ux[k] + (xx * (fx[k] - x[k]) + xy * (fy[k] - y[k]));
+            to_y[k] = uy[k] + (yx * (fx[k] - x[k]) + yy * (fy[k] - y[k]));
         }
-        let out = array_mut::<T, W>(self.out.y, at);
-        for k in 0..W {
-            out[k] = uy[k] + (yx * (fx[k] - x[k]) + yy * (fy[k] - y[k]));
-        }
+        particles.set(self.out.x, self.out.begin, to_x);
+        particles.set(self.out.y, self.out.begin, to_y);
     }
 }
 

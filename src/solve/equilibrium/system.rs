@@ -5,7 +5,7 @@ use crate::flock::block::{apply, inverse};
 use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
 use crate::solve::field::dot;
-use crate::solve::operator::{HELD, Matrix, Operator, RowCoefficients};
+use crate::solve::operator::{HELD, Matrix, Operator, RowCoefficients, power_of_two};
 use std::sync::OnceLock;
 
 /// A body's operator, the forces on it and where its held particles are.
@@ -91,17 +91,17 @@ impl System {
                 if matrix.class[i] == class {
                     continue;
                 }
-                let row = operator.rows.of(class);
+                let row = operator.row(i);
                 let site = [column, segment.row + matrix.columns.step() * k as i32];
                 for (offset, block) in row.entries {
                     let Some(held) = self.held_part(operator.index_of(site, *offset)) else { continue };
-                    let [x, y] = apply(block, held);
+                    let [x, y] = apply(block, held).map(|pull| pull * operator.stiffness);
                     right.x[i] += x;
                     right.y[i] += y;
                 }
                 let [x, y] = operator.held_axes(i);
                 let Some(held) = self.held_part(i).filter(|_| x || y) else { continue };
-                let [fx, fy] = apply(row.diagonal, held);
+                let [fx, fy] = apply(row.diagonal, held).map(|pull| pull * operator.stiffness);
                 right.x[i] = if x { 0.0 } else { right.x[i] - fx };
                 right.y[i] = if y { 0.0 } else { right.y[i] - fy };
             }
@@ -138,7 +138,7 @@ impl Prepared {
         if operator.followers() == 0 {
             return Err(SolveError::NothingFollows);
         }
-        let mut matrix = Matrix::of_followers(operator);
+        let matrix = Matrix::of_followers(operator);
         if let Some(i) = operator.adrift(&matrix) {
             return Err(SolveError::Adrift { particle: i + 1 });
         }
@@ -151,11 +151,9 @@ impl Prepared {
         }
         let force = power_of_two(right.x.iter().chain(&right.y).copied());
         right.x.iter_mut().chain(&mut right.y).for_each(|f| *f /= force);
-        let stiffness = power_of_two(matrix.rows.diagonals().as_flattened().as_flattened().iter().copied());
-        matrix.rows.blocks_mut().flatten().flatten().for_each(|k| *k /= stiffness);
         let size = dot(right.view(), right.view()).sqrt();
         let symmetric = system.asymmetric_pair().is_none();
-        let scales = [1.0 / stiffness, force];
+        let scales = [1.0 / operator.stiffness, force];
         let length = power_of_two(operator.grid.as_flattened().iter().copied());
         let grid = operator.grid.map(|vector| vector.map(|v| v / length));
         Ok(Self { matrix, stencils: OnceLock::new(), right, size, scales, grid, symmetric, team })
@@ -189,16 +187,9 @@ impl Prepared {
     }
 }
 
-/// The power of two nearest below the largest of these in size, as far as its inverse is a double too.
-fn power_of_two(values: impl Iterator<Item = f64>) -> f64 {
-    let largest = values.fold(0.0, |largest: f64, value| largest.max(value.abs()));
-    if largest == 0.0 { 1.0 } else { largest.log2().floor().clamp(-1020.0, 1020.0).exp2() }
-}
-
 /// The first particle, counted from 0, that its own row does not hold back.
 fn loose(matrix: &Matrix) -> Option<usize> {
-    let loose: Vec<bool> =
-        matrix.rows.diagonals().iter().map(|diagonal| inverse(diagonal).is_none()).collect();
+    let loose: Vec<bool> = matrix.rows.iter().map(|row| inverse(row.diagonal).is_none()).collect();
     // A class whose every particle has a held neighbour was replaced by others, and has no particles left.
     let any = loose.contains(&true);
     let is_loose = |&class: &u32| class != HELD && loose[class as usize];

@@ -131,8 +131,7 @@ impl Matrix {
     pub fn of_followers(operator: &Operator) -> Self {
         let columns = Columns::new(operator.columns.sites(), |i| operator.follows[i]);
         let mut class = vec![HELD; operator.count()];
-        let mut rows = Rows::with_capacity(operator.rows.len(), operator.rows.longest());
-        rows.extend(&operator.rows);
+        let mut rows = Rows::sharing(&operator.rows);
         let mut known = HashMap::new();
         // How many particles before each have something held.
         let mut held = vec![0u32];

@@ -11,19 +11,11 @@ pub const PACK: usize = 8;
 /// Particles that are gone over together.
 #[derive(Clone, Debug)]
 pub struct Pack {
-    /// Particle and class of each lane; the last of a group may have fewer.
-    lanes: [(u32, u32); PACK],
-    len: u32,
+    /// The particle of each lane; in the last pack of a group one may be there more than once.
+    pub particles: [u32; PACK],
+    classes: [u32; PACK],
     /// Where its terms lie, as many as the longest of its rows has.
     pub terms: Range<u32>,
-}
-
-impl Pack {
-    /// Particles and their classes.
-    #[inline(always)]
-    pub fn particles(&self) -> &[(u32, u32)] {
-        &self.lanes[..self.len as usize]
-    }
 }
 
 /// The packs of a matrix.
@@ -49,24 +41,29 @@ impl Packs {
                 let begin = packs.read.len();
                 let terms = of_pack.iter().map(|(_, run)| run.terms).max().unwrap_or_default() as usize;
                 packs.read.resize(begin + terms, [of_pack[0].0; PACK]);
-                let mut lanes = [(0, 0); PACK];
-                for (lane, (particle, run)) in of_pack.iter().enumerate() {
-                    lanes[lane] = (*particle, run.class);
+                let lanes: [_; PACK] = std::array::from_fn(|lane| of_pack[lane.min(of_pack.len() - 1)]);
+                for (lane, (particle, run)) in lanes.iter().enumerate() {
                     for (read, &distance) in packs.read[begin..].iter_mut().zip(matrix.distances(run)) {
                         read[lane] = particle.wrapping_add_signed(distance);
                     }
                 }
                 let terms = begin as u32..packs.read.len() as u32;
-                packs.packs.push(Pack { lanes, len: of_pack.len() as u32, terms });
+                let particles = lanes.map(|(particle, _)| particle);
+                packs.packs.push(Pack { particles, classes: lanes.map(|(_, run)| run.class), terms });
             }
             packs.groups.push(packs.packs.len());
         }
         packs
     }
 
+    pub fn all(&self) -> &[Pack] {
+        &self.packs
+    }
+
+    /// Numbers of the packs of a group.
     #[inline(always)]
-    pub fn of_group(&self, group: usize) -> &[Pack] {
-        &self.packs[self.groups[group]..self.groups[group + 1]]
+    pub fn of_group(&self, group: usize) -> Range<usize> {
+        self.groups[group]..self.groups[group + 1]
     }
 
     /// The particles that these terms read.
@@ -83,12 +80,21 @@ impl Packs {
         let mut all = vec![[[T::default(); PACK]; 4]; self.read.len()];
         for pack in &self.packs {
             let of_pack = &mut all[pack.terms.start as usize..pack.terms.end as usize];
-            for (lane, &(_, class)) in pack.particles().iter().enumerate() {
+            for (lane, &class) in pack.classes.iter().enumerate() {
                 for (to, block) in of_pack.iter_mut().zip(blocks(class)) {
                     (0..4).for_each(|entry| to[entry][lane] = block[entry]);
                 }
             }
         }
         all
+    }
+
+    /// Four numbers of the particles of each pack, lane by lane.
+    pub fn of_each<T: Real>(&self, numbers: impl Fn(u32) -> [T; 4]) -> Vec<[[T; PACK]; 4]> {
+        let of_pack = |pack: &Pack| {
+            let of_lane = pack.classes.map(&numbers);
+            std::array::from_fn(|entry| of_lane.map(|numbers| numbers[entry]))
+        };
+        self.packs.iter().map(of_pack).collect()
     }
 }

@@ -3,20 +3,31 @@
 //! A body that fits its outline has thousands of them on every level of multigrid: to allocate each by itself takes longer
 //! than to add it up.
 
+use std::sync::Arc;
+
 use super::Row;
 use crate::flock::block::Block;
 use crate::flock::lattice::Site;
 
-/// One of them; what its numbers mean says [`Row`](super::Row).
+/// One of them; what its numbers mean says [`Row`].
 #[derive(Clone, Copy, Debug)]
 pub struct RowRef<'a> {
     pub diagonal: &'a Block,
     pub entries: &'a [(Site, Block)],
 }
 
+#[cfg(test)]
+impl RowRef<'_> {
+    pub fn to_row(self) -> Row {
+        Row { diagonal: *self.diagonal, entries: self.entries.to_vec() }
+    }
+}
+
 /// Rows by class.
 #[derive(Clone, Debug, Default)]
 pub struct Rows {
+    /// Those that come first and are another's as well.
+    shared: Option<Arc<Rows>>,
     diagonals: Vec<Block>,
     /// Where the entries of each end.
     ends: Vec<u32>,
@@ -32,13 +43,25 @@ impl From<Vec<Row>> for Rows {
 }
 
 impl Rows {
+    /// Those of another, to which more may be added.
+    pub fn sharing(rows: &Arc<Rows>) -> Self {
+        Self { shared: Some(rows.clone()), ..Self::default() }
+    }
+
+    fn shared(&self) -> usize {
+        self.shared.as_ref().map_or(0, |rows| rows.len())
+    }
+
     pub fn len(&self) -> usize {
-        self.diagonals.len()
+        self.shared() + self.diagonals.len()
     }
 
     /// The row of a class.
     pub fn of(&self, class: u32) -> RowRef<'_> {
-        let class = class as usize;
+        if let Some(rows) = self.shared.as_ref().filter(|rows| (class as usize) < rows.len()) {
+            return rows.of(class);
+        }
+        let class = class as usize - self.shared();
         let start = class.checked_sub(1).map_or(0, |before| self.ends[before]);
         let entries = &self.entries[start as usize..self.ends[class] as usize];
         RowRef { diagonal: &self.diagonals[class], entries }
@@ -72,6 +95,7 @@ impl Rows {
             diagonals: Vec::with_capacity(rows),
             ends: Vec::with_capacity(rows),
             entries: Vec::with_capacity(rows * entries),
+            ..Self::default()
         }
     }
 
@@ -81,29 +105,12 @@ impl Rows {
         let mut pieces = pieces.into_iter();
         let mut all = pieces.next().unwrap_or_default();
         all.entries.reserve_exact(entries - all.entries.len());
-        pieces.for_each(|piece| all.extend(&piece));
+        for piece in pieces {
+            let before = all.entries.len() as u32;
+            all.diagonals.extend_from_slice(&piece.diagonals);
+            all.ends.extend(piece.ends.iter().map(|end| before + end));
+            all.entries.extend_from_slice(&piece.entries);
+        }
         all
-    }
-
-    /// Adds all rows of these.
-    pub fn extend(&mut self, others: &Self) {
-        let before = self.entries.len() as u32;
-        self.diagonals.extend_from_slice(&others.diagonals);
-        self.ends.extend(others.ends.iter().map(|end| before + end));
-        self.entries.extend_from_slice(&others.entries);
-    }
-
-    /// Most entries of a row.
-    pub fn longest(&self) -> usize {
-        self.iter().map(|row| row.entries.len()).max().unwrap_or_default()
-    }
-
-    /// The blocks of all rows, to be changed.
-    pub fn blocks_mut(&mut self) -> impl Iterator<Item = &mut Block> {
-        self.diagonals.iter_mut().chain(self.entries.iter_mut().map(|(_, block)| block))
-    }
-
-    pub fn diagonals(&self) -> &[Block] {
-        &self.diagonals
     }
 }

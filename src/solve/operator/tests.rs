@@ -12,9 +12,9 @@ struct Collect {
 }
 
 impl Task<f64> for Collect {
-    fn take<const W: usize>(&mut self, at: usize, _: &[f64; 4], x: &[f64; W], y: &[f64; W]) {
-        self.product.x[at..at + W].copy_from_slice(x);
-        self.product.y[at..at + W].copy_from_slice(y);
+    fn take<const W: usize>(&mut self, particles: &impl Particles<f64, W>, x: &[f64; W], y: &[f64; W]) {
+        particles.set(&mut self.product.x, 0, *x);
+        particles.set(&mut self.product.y, 0, *y);
     }
 }
 
@@ -38,8 +38,8 @@ fn the_compiled_matrix_is_the_rows_over_the_followers() {
         for (i, site) in operator.columns.sites().enumerate() {
             let mut expected = [0.0; 2];
             if operator.follows()[i] {
-                expected = apply(&operator.row(i).diagonal, u.get(i));
-                for (offset, block) in &operator.row(i).entries {
+                expected = apply(operator.row(i).diagonal, u.get(i));
+                for (offset, block) in operator.row(i).entries {
                     let pull = apply(block, u.get(operator.index_of(site, *offset)));
                     expected = [expected[0] - pull[0], expected[1] - pull[1]];
                 }
@@ -94,8 +94,11 @@ fn a_pair_that_does_not_feel_each_other_alike_is_found() {
         assert_eq!(symmetric.asymmetric_pair(), None, "{kind:?}");
         let mut other = symmetric.clone();
         let class = other.class[70];
-        let offset = other.rows[class as usize].entries[1].0;
-        other.rows[class as usize].entries[1].1[0][1] += 1e-3;
+        let mut rows: Vec<Row> = other.rows.iter().map(RowRef::to_row).collect();
+        let (offset, block) = &mut rows[class as usize].entries[1];
+        block[0][1] += 1e-3;
+        let offset = *offset;
+        other.rows = Arc::new(Rows::from(rows));
         let [first, second] = other.asymmetric_pair().expect("not symmetric");
         let sites: Vec<Site> = other.columns.sites().collect();
         let apart = [0, 1].map(|k| sites[second][k] - sites[first][k]);

@@ -5,8 +5,8 @@ use super::envelope::Envelope;
 use super::transfer::{OutlierShares, Transfer};
 use super::*;
 use crate::flock::lattice::{Lattice, LatticeKind, Site};
-use crate::solve::operator::HELD;
 use crate::solve::operator::samples::{operator, with_outliers};
+use crate::solve::operator::{HELD, Row, RowRef};
 
 fn dense(matrix: &Matrix) -> Vec<Vec<f64>> {
     let stencils = RowCoefficients::<f64>::new(matrix, 1.0);
@@ -156,8 +156,9 @@ fn the_envelope_solves_what_it_factorised() {
 #[test]
 fn the_envelope_refuses_what_is_not_positive_and_leaves_out_what_is_nothing() {
     let mut matrix = Matrix::of_followers(&operator(LatticeKind::SAMPLES[0], 9, 9, |i| i < 5));
-    let rows = matrix.rows.len();
-    matrix.rows.blocks_mut().take(rows).for_each(|diagonal| diagonal[1][1] -= 2.0);
+    let mut rows: Vec<Row> = matrix.rows.iter().map(RowRef::to_row).collect();
+    rows.iter_mut().for_each(|row| row.diagonal[1][1] -= 2.0);
+    matrix.rows = rows.into();
     assert!(Envelope::new(&matrix, 1.0, false).is_none());
     // A strip one particle wide between two columns of nodes: they are twice as many as can move.
     let sites: Vec<Site> = (0..40).map(|j| [1, j]).collect();
@@ -168,7 +169,7 @@ fn the_envelope_refuses_what_is_not_positive_and_leaves_out_what_is_nothing() {
             .map(|offset| (offset, [[1.0, 0.0], [0.0, 1.0]]))
             .collect();
         let count = entries.len() as f64;
-        crate::solve::operator::Row { diagonal: [[count, 0.0], [0.0, count]], entries }
+        Row { diagonal: [[count, 0.0], [0.0, count]], entries }
     };
     let grid = [[1.0, 0.0], [0.0, 1.0]];
     let follows = (0..40).map(|j| j > 0).collect();
