@@ -102,7 +102,7 @@ pub struct Operator {
     rows: Arc<Rows>,
     /// The power of two near the largest stiffness that holds a particle back \[force / length\]: no square of one over- or
     /// underflows, and no bit changes.
-    pub(crate) stiffness: f64,
+    pub(super) stiffness: f64,
     pub(super) follows: Vec<bool>,
     /// Vectors from a site to that of the next column and of the next row \[length\].
     pub(super) grid: [[f64; 2]; 2],
@@ -217,8 +217,14 @@ impl Operator {
         &self.follows
     }
 
+    /// The row of a follower.
+    pub fn row(&self, particle: usize) -> Row {
+        let RowRef { diagonal, entries } = self.scaled_row(particle);
+        Row { diagonal: *diagonal, entries: entries.to_vec() }.divided_by(1.0 / self.stiffness)
+    }
+
     /// The row of a follower, divided by the stiffness.
-    pub(crate) fn row(&self, particle: usize) -> RowRef<'_> {
+    pub(super) fn scaled_row(&self, particle: usize) -> RowRef<'_> {
         self.rows.of(self.class[particle])
     }
 
@@ -288,7 +294,7 @@ impl Operator {
                     len = len.min(found.map_or(1, |(_, room)| room));
                     firsts.push(found.map(|(first, _)| first));
                 }
-                if let Some(answer) = take(Stretch { start, len, class }, &firsts) {
+                if let Some(answer) = take(Stretch { site, start, len, class }, &firsts) {
                     return Some(answer);
                 }
                 start += len;
@@ -320,6 +326,8 @@ impl Operator {
 /// index distance.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stretch {
+    /// Of the first one.
+    pub site: Site,
     pub start: usize,
     pub len: usize,
     pub class: u32,

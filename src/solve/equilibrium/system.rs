@@ -91,7 +91,7 @@ impl System {
                 if matrix.class[i] == class {
                     continue;
                 }
-                let row = operator.row(i);
+                let row = operator.scaled_row(i);
                 let site = [column, segment.row + matrix.columns.step() * k as i32];
                 for (offset, block) in row.entries {
                     let Some(held) = self.held_part(operator.index_of(site, *offset)) else { continue };

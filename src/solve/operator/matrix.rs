@@ -26,7 +26,7 @@ const GROUP: u32 = 1 << 13;
 const PACKED: u32 = 3;
 
 /// Cost that is one thread's alone: two would wait for each other longer than they save.
-const ALONE: u32 = 14_000;
+const ALONE: u32 = 20_000;
 
 /// Least cost of a group, of what all cost: one group up to [`ALONE`], and an even number of about as large ones above.
 fn group_size(cost: u32) -> u32 {
@@ -83,21 +83,32 @@ pub struct Matrix {
 impl Matrix {
     /// `columns` hold the particles that have a class, and the entries of every row lead to such.
     pub fn compile(columns: Columns, class: Vec<u32>, rows: Rows) -> Self {
+        let mut runs = Runs::default();
+        for (column, segment) in columns.iter() {
+            runs.find(
+                (&columns, &class, &rows),
+                [column, segment.row],
+                segment.start..segment.start + segment.len,
+            );
+        }
+        Self::of_runs(columns, class, rows, runs)
+    }
+
+    fn of_runs(columns: Columns, class: Vec<u32>, rows: Rows, Runs { runs, distances, .. }: Runs) -> Self {
+        let outliers = Outliers { first: class.len(), ..Outliers::default() };
         let mut matrix = Self {
             columns,
             class,
             rows,
-            runs: Vec::new(),
-            distances: Vec::new(),
+            runs,
+            distances,
             bounds: Vec::new(),
             group_columns: Vec::new(),
             group_runs: Vec::new(),
             packs: Packs::default(),
-            outliers: Outliers::default(),
+            outliers,
             part: None,
         };
-        matrix.outliers.first = matrix.class.len();
-        matrix.find_runs();
         matrix.group(group_size);
         matrix
     }
@@ -132,17 +143,21 @@ impl Matrix {
         let columns = Columns::new(operator.columns.sites(), |i| operator.follows[i]);
         let mut class = vec![HELD; operator.count()];
         let mut rows = Rows::sharing(&operator.rows);
-        let mut known = HashMap::new();
+        let (mut known, mut runs, mut distances) = (HashMap::new(), Runs::default(), Vec::new());
         // How many particles before each have something held.
         let mut held = vec![0u32];
         held.extend((0..operator.count()).scan(0, |held, i| {
             *held += u32::from(!operator.follows[i] || operator.held_axes(i) != [false; 2]);
             Some(*held)
         }));
-        operator.stretches(|Stretch { start, len, class: full, .. }, firsts| {
+        operator.stretches(|Stretch { site, start, len, class: full }, firsts| {
             let firsts = || firsts.iter().map(|first| first.expect("checked when made"));
             if std::iter::once(start).chain(firsts()).all(|first| held[first] == held[first + len]) {
                 class[start..start + len].fill(full);
+                distances.clear();
+                distances.push(0);
+                distances.extend(firsts().map(|first| first as i32 - start as i32));
+                runs.push(start as u32..(start + len) as u32, full, &distances);
                 return None::<()>;
             }
             for k in 0..len {
@@ -160,10 +175,11 @@ impl Matrix {
                         rows.len() as u32 - 1
                     });
             }
+            runs.find((&columns, &class, &rows), site, start as u32..(start + len) as u32);
             None
         });
         let outliers = operator.outliers.clone();
-        Self { outliers, ..Self::compile(columns, class, rows) }
+        Self { outliers, ..Self::of_runs(columns, class, rows, runs) }
     }
 
     pub fn count(&self) -> usize {
@@ -230,37 +246,50 @@ impl Matrix {
         let entries = entries.filter(|(offset, _)| !leads_to_outlier(*offset));
         entries.fold([0, 0], |far, (o, _)| [far[0].max(o[0].abs()), far[1].max(o[1].abs())])
     }
+}
 
-    fn find_runs(&mut self) {
-        // Where the distances last used with each class lie: most columns are like the one before.
-        let mut last = vec![None; self.rows.len()];
-        let mut found = Vec::new();
-        for (column, segment) in self.columns.iter() {
-            let mut done = 0;
-            while done < segment.len {
-                let start = segment.start + done;
-                let class = self.class[start as usize];
-                let classes = &self.class[start as usize..(segment.start + segment.len) as usize];
-                let mut len = classes.iter().take_while(|&&c| c == class).count();
-                let site = [column, segment.row + self.columns.step() * done as i32];
-                found.clear();
-                found.push(0);
-                for (offset, _) in self.rows.of(class).entries {
-                    let (there, room) =
-                        self.columns.find(add(site, *offset)).expect("rows lead to followers");
-                    len = len.min(room);
-                    found.push(there as i32 - start as i32);
-                }
-                let known = last[class as usize].filter(|&at| self.distances[at..].starts_with(&found));
-                let at = known.unwrap_or_else(|| {
-                    self.distances.extend(&found);
-                    self.distances.len() - found.len()
-                });
-                last[class as usize] = Some(at);
-                let (distances, terms) = (at as u32, found.len() as u32);
-                self.runs.push(Run { start, len: len as u32, class, distances, terms });
-                done += len as u32;
+/// Runs that are being found.
+#[derive(Default)]
+struct Runs {
+    runs: Vec<Run>,
+    distances: Vec<i32>,
+    /// Where the distances last used with each class lie: most columns are like the one before.
+    last: Vec<Option<usize>>,
+}
+
+impl Runs {
+    /// Adds a run of a class with these distances.
+    fn push(&mut self, particles: Range<u32>, class: u32, distances: &[i32]) {
+        if self.last.len() <= class as usize {
+            self.last.resize(class as usize + 1, None);
+        }
+        let known = self.last[class as usize].filter(|&at| self.distances[at..].starts_with(distances));
+        let at = known.unwrap_or_else(|| {
+            self.distances.extend(distances);
+            self.distances.len() - distances.len()
+        });
+        self.last[class as usize] = Some(at);
+        let (start, len) = (particles.start, particles.len() as u32);
+        self.runs.push(Run { start, len, class, distances: at as u32, terms: distances.len() as u32 });
+    }
+
+    /// Adds the runs of particles in a segment, of which the first stands at a site.
+    fn find(&mut self, (columns, class, rows): (&Columns, &[u32], &Rows), site: Site, particles: Range<u32>) {
+        let (mut start, mut found) = (particles.start, Vec::new());
+        while start < particles.end {
+            let own = class[start as usize];
+            let classes = &class[start as usize..particles.end as usize];
+            let mut len = classes.iter().take_while(|&&c| c == own).count();
+            let site = [site[0], site[1] + columns.step() * (start - particles.start) as i32];
+            found.clear();
+            found.push(0);
+            for (offset, _) in rows.of(own).entries {
+                let (there, room) = columns.find(add(site, *offset)).expect("rows lead to followers");
+                len = len.min(room);
+                found.push(there as i32 - start as i32);
             }
+            self.push(start..start + len as u32, own, &found);
+            start += len as u32;
         }
     }
 }

@@ -70,7 +70,7 @@ pub fn with_outliers(operator: &Operator) -> Operator {
             [there[0] - new_sites[new][0], there[1] - new_sites[new][1]]
         };
         let row = operator.row(old);
-        Row { diagonal: *row.diagonal, entries: row.entries.iter().map(|&(o, b)| (offset(o), b)).collect() }
+        Row { diagonal: row.diagonal, entries: row.entries.iter().map(|&(o, b)| (offset(o), b)).collect() }
     };
     let follows = order.iter().map(|&old| operator.follows()[old]).collect();
     let beside = |k: usize| 0.3 * (k as f64 * 0.618).fract() - 0.1;

@@ -38,8 +38,8 @@ fn the_compiled_matrix_is_the_rows_over_the_followers() {
         for (i, site) in operator.columns.sites().enumerate() {
             let mut expected = [0.0; 2];
             if operator.follows()[i] {
-                expected = apply(operator.row(i).diagonal, u.get(i));
-                for (offset, block) in operator.row(i).entries {
+                expected = apply(operator.scaled_row(i).diagonal, u.get(i));
+                for (offset, block) in operator.scaled_row(i).entries {
                     let pull = apply(block, u.get(operator.index_of(site, *offset)));
                     expected = [expected[0] - pull[0], expected[1] - pull[1]];
                 }
