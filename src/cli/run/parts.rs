@@ -13,7 +13,9 @@ use flockform::engine::Engine;
 use flockform::engine::observer::Observer;
 use flockform::export::checkpoint;
 use flockform::export::memory::Outputs;
-use flockform::export::{ExportError, OutputFolder, Timings, VtkSeries, write_all_of_parts, write_piece};
+use flockform::export::{
+    Drawing, ExportError, OutputFolder, Results, Timings, VtkSeries, probes_of_parts, write_all, write_piece,
+};
 use flockform::ranks::Team;
 use flockform::scene::Scene;
 
@@ -179,8 +181,11 @@ pub fn run(
     }
     let timings = Timings { setup, steps: elapsed.saturating_sub(writing), output: writing };
     let folder = observer.folder.take();
-    let results = (&scene, &outcome, &observer.probes[..]);
-    let summary = write_all_of_parts(folder.as_ref(), results, timings, team)?;
+    let probes = &probes_of_parts(&outcome.engine, &observer.probes, team)[..];
+    let (snapshots, load_steps) = (&[], &[]);
+    let results = Results { scene: &scene, outcome: &outcome, snapshots, probes, load_steps, timings };
+    let drawing = Drawing { formats: arguments.figures.figures, ..Drawing::default() };
+    let (_, summary) = write_all(folder.as_ref(), &results, drawing)?;
     let Some(folder) = folder else { return Ok(ExitCode::SUCCESS) };
     let kept = interrupt::commit(folder)?;
     if !is_interrupted {
