@@ -367,8 +367,7 @@ impl Engine {
     }
 
     fn any_leader_goes_on(&self) -> bool {
-        let own = self.leaders.iter().any(|led| self.goes_on(led));
-        self.parted().map_or(own, |team| team.any(own))
+        self.any_of_parts(self.leaders.iter().any(|led| self.goes_on(led)))
     }
 
     /// Looks over the last step.

@@ -153,6 +153,11 @@ impl Engine {
         .map(f64::from_bits)
     }
 
+    /// Whether it is so in any part of the body.
+    pub fn any_of_parts(&self, own: bool) -> bool {
+        self.parted().map_or(own, |team| team.any(own))
+    }
+
     /// How many there are in all parts.
     pub fn count_of_parts(&self, own: usize) -> usize {
         self.parted().map_or(own, |team| team.sum([own as u64])[0] as usize)

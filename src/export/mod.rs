@@ -68,6 +68,7 @@ mod folder;
 pub mod load;
 pub(crate) mod manifest;
 pub mod memory;
+mod parts;
 pub mod report;
 #[cfg(feature = "bench")]
 pub mod scale;
