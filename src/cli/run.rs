@@ -37,7 +37,7 @@ use words::{closing_words, where_to_look};
 
 use super::checkpoint::{CheckpointArguments, Checkpointer, ResumedRun, resume_words};
 use super::film::{BodyFilmArguments, Finish};
-use super::names::{FileName, SceneArguments, in_full};
+use super::names::{FileName, Overrides, SceneArguments, in_full};
 use super::output::{FigureArguments, OutputArguments, ReportArguments, command_line};
 use super::progress::Progress;
 use super::ranks::{self, Interrupted, RanksError, Start};
@@ -45,13 +45,13 @@ use super::recording::{RecordArguments, close};
 use super::{FAILED, Refusal, interrupt, memory};
 
 #[derive(Debug, Args)]
+#[command(mut_arg("set", |set| set.requires("scene")))]
 pub struct RunArguments {
     /// Name of a bundled scene (see `flockform list scenes`) or path of a scene file; not with --resume
     #[arg(required_unless_present = "resume", value_parser = FileName::SCENE, hide_possible_values = true)]
     scene: Option<String>,
-    /// Override a key of the scene, validated like the file: `lattice.spacing=0.5`, `roles[1].from=30`
-    #[arg(long = "set", value_name = "KEY.PATH=VALUE", requires = "scene")]
-    set: Vec<String>,
+    #[command(flatten)]
+    overrides: Overrides,
     #[command(flatten)]
     output: OutputArguments,
     #[command(flatten)]
@@ -105,7 +105,7 @@ impl Prepared {
     fn new(arguments: &RunArguments, team: Option<&Team>, begin: &mut Start<'_>) -> Result<Self, Refusal> {
         let mut left = arguments.checkpoints.left()?;
         let asked = arguments.asked(left.as_ref());
-        let words_of = SceneArguments { scene: asked.scene.clone(), set: asked.set.clone() };
+        let words_of = SceneArguments::new(&asked.scene, &asked.set);
         let parts = |scene: &Scene| if arguments.is_parted(scene) { team.map_or(1, Team::count) } else { 1 };
         let scene = words_of.load_part(&[], parts)?;
         // Before a choice, which solves the scene several times.
@@ -316,7 +316,7 @@ impl RunArguments {
             (None, None) => unreachable!("a scene is required without --resume"),
             (Some(scene), _) => {
                 let steps = self.steps.map(|steps| format!("stop.steps={steps}"));
-                let set = self.set.iter().cloned().chain(steps).collect();
+                let set = self.overrides.set.iter().cloned().chain(steps).collect();
                 RunRequest { scene: in_full(scene), set, force }
             }
         }
