@@ -171,7 +171,11 @@ fn final_rows(engine: &Engine, stresses: Option<&[Option<StressState>]>) -> impl
 /// Writes every broken bond in the order they broke: its step (0 for those cut before the first), its
 /// two particles, its middle in the reference configuration \[length\] and along the body \[1\], and the
 /// length at which it broke \[length\].
-pub fn write_breaks(folder: &OutputFolder, body: &Body, breaks: &[Break]) -> Result<PathBuf, ExportError> {
+pub(crate) fn write_breaks(
+    folder: &OutputFolder,
+    body: &Body,
+    breaks: &[Break],
+) -> Result<PathBuf, ExportError> {
     let along = body.along();
     let rows = breaks.iter().map(|one| {
         let [id_a, id_b] = body.ids(one.pair);
@@ -183,7 +187,7 @@ pub fn write_breaks(folder: &OutputFolder, body: &Body, breaks: &[Break]) -> Res
 }
 
 /// Writes the residual before the first iteration of a solver and after each.
-pub fn write_residuals(folder: &OutputFolder, residuals: &[f64]) -> Result<PathBuf, ExportError> {
+pub(crate) fn write_residuals(folder: &OutputFolder, residuals: &[f64]) -> Result<PathBuf, ExportError> {
     let row = |(iteration, &residual): (usize, &f64)| ResidualRow { iteration, residual };
     write(folder, "residuals.csv", residuals.iter().enumerate().map(row))
 }
