@@ -11,8 +11,7 @@ use flockform::engine::Engine;
 use flockform::engine::state::EngineState;
 use flockform::export::checkpoint::{Checkpoint, CheckpointError, RunRequest};
 use flockform::export::report::RunRecorder;
-use flockform::export::{ExportError, OutputFolder, VtkSeries, probes_of_parts, unfinished};
-use flockform::ranks::Team;
+use flockform::export::{ExportError, OutputFolder, VtkSeries, unfinished};
 use flockform::scene::Scene;
 
 use super::interrupt;
@@ -182,89 +181,84 @@ impl<'a> Checkpointer<'a> {
             })
     }
 
-    /// Keeps the run as it is now, to be gone on with if it is killed. One that cannot be written does not end the run.
-    pub fn keep(&mut self, folder: &mut OutputFolder, engine: (&Engine, f64), mut kept: Recorded<'_>) {
-        (self.last_step, self.last) = (engine.0.step(), Instant::now());
-        let synced = kept.frames.as_mut().map_or(Ok(()), |frames| frames.sync());
-        if let Err(error) = synced.and_then(|()| self.write(folder, engine, &kept)) {
-            interrupt::leave_to_the_end();
-            tracing::warn!("no checkpoint at step {}: {error}", self.last_step);
-            return;
-        }
-        let took = self.last.elapsed();
-        tracing::debug!("checkpoint of step {} in {took:.1?}", self.last_step);
-        self.last = Instant::now();
-    }
-
-    /// Keeps a run of which each rank has a part, by all of them together; the first one has the folder, in which the others
-    /// write too, and the frames. Returns whether it is kept.
-    pub fn keep_parts(
+    /// Keeps the run as it is now, to be gone on with if it is killed, by all ranks together where each has a part of the body;
+    /// the first one has the folder and the frames. One that cannot be written does not end the run.
+    pub fn keep(
         &mut self,
         folder: Option<&mut OutputFolder>,
-        (engine, residual, probes): (&Engine, f64, &[usize]),
-        frames: Option<&mut VtkSeries>,
-        team: &Team,
-    ) -> bool {
-        (self.last_step, self.last) = (engine.step(), Instant::now());
-        let path = folder.as_ref().map_or(&b""[..], |folder| folder.folder().as_os_str().as_encoded_bytes());
-        let paths = team.each_bytes(path);
-        let state = EngineState::of(engine);
-        let first = engine.body().first() + engine.body().owned().start;
-        let parts = team.each([first as u64, state.count() as u64]);
-        let of = (&self.asked, self.scene, self.digest);
-        let probes = probes_of_parts(engine, probes, team);
-        let own = Checkpoint::new(of, (state, residual), (&[], &probes, &[], None), self.stepping());
-        let written = match &folder {
-            Some(_) => frames.map_or(Ok(()), VtkSeries::sync),
-            None => own.write_part(Path::new(&*String::from_utf8_lossy(&paths[0])), team.rank()),
-        };
-        let is_whole = !team.any(written.is_err());
-        let named = folder.filter(|_| is_whole).map_or(Ok(()), |folder| {
-            let parts: Vec<_> =
-                parts.iter().map(|&[first, count]| (first as usize, count as usize)).collect();
-            own.write_with_parts(folder.folder(), &parts)?;
-            interrupt::keep_unfinished(folder, resume_words)
-        });
-        let is_kept = is_whole && !team.any(named.is_err());
-        if let Err(error) = written.and(named) {
-            tracing::warn!("no checkpoint at step {}: {error}", self.last_step);
+        engine: (&Engine, f64),
+        mut kept: Recorded<'_>,
+    ) {
+        (self.last_step, self.last) = (engine.0.step(), Instant::now());
+        let synced = kept.frames.as_mut().map_or(Ok(()), |frames| frames.sync());
+        match self.write(folder, engine, &kept, synced) {
+            Ok(()) => {
+                let took = self.last.elapsed();
+                tracing::debug!("checkpoint of step {} in {took:.1?}", self.last_step);
+            }
+            Err(error) => {
+                interrupt::leave_to_the_end();
+                warn_of(&format!("no checkpoint at step {}", self.last_step), &error);
+            }
         }
         self.last = Instant::now();
-        is_kept
     }
 
     /// Whether a run that is broken off is to be gone on with.
-    pub fn is_asked(&self) -> bool {
+    fn is_asked(&self) -> bool {
         self.every.iter().any(|interval| *interval != Interval::Never)
     }
 
     /// Leaves a checkpoint of the last step, and says whether there is one. Frames are on their way to the disk then: to wait
     /// for each would take longer than an interrupt may.
-    pub fn leave(&self, folder: &mut OutputFolder, engine: (&Engine, f64), kept: &Recorded<'_>) -> bool {
+    pub fn leave(
+        &self,
+        folder: Option<&mut OutputFolder>,
+        engine: (&Engine, f64),
+        kept: &Recorded<'_>,
+    ) -> bool {
         if self.scene.equilibrium.is_some() || !self.is_asked() {
             return false;
         }
-        let left = self.write(folder, engine, kept);
+        let left = self.write(folder, engine, kept, Ok(()));
         if let Err(error) = &left {
             interrupt::leave_to_the_end();
-            tracing::warn!("the run could not be resumed: {error}");
+            warn_of("the run could not be resumed", error);
         }
-        left.is_ok()
+        !engine.0.any_of_parts(left.is_err())
     }
 
-    /// Writes it before the folder takes its name: that one is never without a checkpoint.
+    /// Writes it, once the frames are there as `synced` says, before the folder takes its name: that one is never without a
+    /// checkpoint.
     fn write(
         &self,
-        folder: &mut OutputFolder,
+        mut folder: Option<&mut OutputFolder>,
         (engine, residual): (&Engine, f64),
         kept: &Recorded<'_>,
+        synced: Result<(), ExportError>,
     ) -> Result<(), ExportError> {
         let of = (&self.asked, self.scene, self.digest);
         let animation = kept.animation.map(RunRecorder::animation_state);
         let recorded = (kept.snapshots, kept.probes, kept.load_steps, animation);
         let state = (EngineState::of(engine), residual);
-        Checkpoint::new(of, state, recorded, self.stepping()).write(folder.folder())?;
+        let mut checkpoint = Checkpoint::new(of, state, recorded, self.stepping());
+        if let Some(team) = engine.parted() {
+            let first = engine.body().first() + engine.body().owned().start;
+            let folder = folder.as_deref().map(OutputFolder::folder);
+            checkpoint = checkpoint.with_parts(folder, (first, team), synced)?;
+        } else {
+            synced?;
+        }
+        let Some(folder) = folder.as_mut() else { return Ok(()) };
+        checkpoint.write(folder.folder())?;
         interrupt::keep_unfinished(folder, resume_words)
+    }
+}
+
+/// Says why there is no checkpoint; where another rank is at fault, that one does.
+fn warn_of(what: &str, error: &ExportError) {
+    if !matches!(error, ExportError::OnRank { .. }) {
+        tracing::warn!("{what}: {error}");
     }
 }
 

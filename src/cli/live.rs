@@ -20,7 +20,7 @@ use flockform::scene::swarm::Swarm as SwarmFile;
 use flockform::swarm::control::Control;
 use flockform::swarm::flight::{Flight, Sample};
 
-use super::names::{FileName, Kind, SceneArguments, folder_of};
+use super::names::{FileName, Kind, Overrides, SceneArguments, folder_of};
 use super::recording::{self, RecordArguments};
 use super::swarm::{SwarmFileArguments, fly_recorded};
 use super::{Refusal, interrupt, output, print, say};
@@ -30,9 +30,8 @@ pub struct LiveArguments {
     /// Name of a bundled scene or swarm, or path of a file
     #[arg(value_parser = FileName::ANY, hide_possible_values = true, group = "page")]
     file: String,
-    /// Override a key, validated like the file: `lattice.spacing=0.5`
-    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
-    set: Vec<String>,
+    #[command(flatten)]
+    overrides: Overrides,
     #[command(flatten)]
     page: PageArguments,
     #[command(flatten)]
@@ -132,14 +131,14 @@ pub fn close(door: Option<PathBuf>) {
 
 impl LiveArguments {
     fn session(&self) -> Result<Box<dyn Session>, Refusal> {
-        let (file, set, folder) = (self.file.clone(), self.set.clone(), folder_of(&self.file));
-        Ok(match Kind::of_either(&file)? {
+        let (file, set, folder) = (&self.file, &self.overrides.set, folder_of(&self.file));
+        Ok(match Kind::of_either(file)? {
             Kind::Scene => {
-                let scene = SceneArguments { scene: file, set }.load([])?;
+                let scene = SceneArguments::new(file, set).load([])?;
                 Box::new(Body::new(scene, folder)?)
             }
             Kind::Swarm => {
-                let swarm = SwarmFileArguments { swarm: file, set }.load()?;
+                let swarm = SwarmFileArguments::new(file, set).load()?;
                 Box::new(Swarm::new(swarm, folder)?)
             }
         })

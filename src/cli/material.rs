@@ -11,11 +11,12 @@ use flockform::material::homogenise::Crystal;
 use flockform::material::report::MaterialReport;
 
 use super::Refusal;
-use super::names::{FileName, SceneArguments};
+use super::names::{FileName, Overrides, SceneArguments};
 
 /// A question: a scene's rule, a rule given by its lattice and weights, or a material given by its
 /// constants.
 #[derive(Debug, Args)]
+#[command(mut_arg("set", |set| set.requires("scene")))]
 pub struct MaterialArguments {
     /// Name of a bundled scene or path of a scene file whose rule to examine
     #[arg(
@@ -24,9 +25,8 @@ pub struct MaterialArguments {
         conflicts_with_all = ["lattice", "neighbours", "weights", "young"]
     )]
     scene: Option<String>,
-    /// Override a key of the scene, as in `flockform run`
-    #[arg(long = "set", value_name = "KEY.PATH=VALUE", requires = "scene")]
-    set: Vec<String>,
+    #[command(flatten)]
+    overrides: Overrides,
     #[command(flatten)]
     lattice: LatticeArguments,
     /// Neighbours of a particle: first, first:3, chebyshev:1, second, collinear, within:1.5, or offsets in columns
@@ -131,7 +131,7 @@ pub fn wrong(option: &'static str, message: impl Into<String>, help: impl Into<S
 pub fn answer(arguments: &MaterialArguments) -> Result<String, Refusal> {
     let report = match &arguments.scene {
         Some(scene) => {
-            let scene = SceneArguments { scene: scene.clone(), set: arguments.set.clone() }.load([])?;
+            let scene = SceneArguments::new(scene, &arguments.overrides.set).load([])?;
             bulk_response::material(&scene)?
         }
         None => {

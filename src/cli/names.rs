@@ -179,18 +179,29 @@ impl TypedValueParser for FileName {
     }
 }
 
+/// Changes to a scene or swarm file; where that may be left out, the command requires it for them.
+#[derive(Clone, Debug, Args)]
+pub struct Overrides {
+    /// Override a key, validated like the file: `lattice.spacing=0.5`, `roles[1].from=30`
+    #[arg(long, value_name = "KEY.PATH=VALUE")]
+    pub set: Vec<String>,
+}
+
 /// A scene and the changes to it.
 #[derive(Debug, Args)]
 pub struct SceneArguments {
     /// Name of a bundled scene (see `flockform list scenes`) or path of a scene file
     #[arg(value_parser = FileName::SCENE, hide_possible_values = true)]
     pub scene: String,
-    /// Override a key of the scene, validated like the file: `lattice.spacing=0.5`, `roles[1].from=30`
-    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
-    pub set: Vec<String>,
+    #[command(flatten)]
+    pub overrides: Overrides,
 }
 
 impl SceneArguments {
+    pub fn new(scene: &str, set: &[String]) -> Self {
+        Self { scene: scene.to_owned(), overrides: Overrides { set: set.to_vec() } }
+    }
+
     pub fn load(&self, more: impl IntoIterator<Item = String>) -> Result<Scene, Refusal> {
         self.load_part(&more.into_iter().collect::<Vec<_>>(), |_| 1)
     }
@@ -208,7 +219,7 @@ impl SceneArguments {
 
     /// The scene with these overrides after the user's own.
     pub fn load_scene(&self, more: &[String]) -> Result<Scene, SceneError> {
-        let overrides = [&self.set, more].concat();
+        let overrides = [&self.overrides.set, more].concat();
         match bundled(&self.scene) {
             Some(bundled) => bundled.load(&overrides),
             None => Scene::from_file(Path::new(&self.scene), &overrides),

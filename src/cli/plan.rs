@@ -13,7 +13,7 @@ use flockform::swarm::plan::SwarmPlan;
 use serde_json::{Value, json};
 
 use super::memory::{of_part, predicted, require};
-use super::names::{FileName, Kind, SceneArguments};
+use super::names::{FileName, Kind, Overrides, SceneArguments};
 use super::ranks::RanksError;
 use super::swarm::SwarmFileArguments;
 use super::{Refusal, print, say};
@@ -23,9 +23,8 @@ pub struct PlanArguments {
     /// Name of a bundled scene or swarm (see `flockform list`) or path of a file of either kind
     #[arg(value_parser = FileName::ANY, hide_possible_values = true)]
     file: String,
-    /// Override a key of the file, validated like the file: `lattice.spacing=0.5`, `roles[1].from=30`
-    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
-    set: Vec<String>,
+    #[command(flatten)]
+    overrides: Overrides,
     /// Also say how so many ranks would share the run of a scene (see the guide to ranks)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     ranks: Option<u16>,
@@ -36,18 +35,18 @@ pub struct PlanArguments {
 
 /// Plans a scene or a swarm and prints the plan; a file of neither kind is refused as a scene.
 pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
-    let PlanArguments { file, set, ranks, json } = arguments;
+    let PlanArguments { file, overrides: Overrides { set }, ranks, json } = arguments;
     let (words, value) = match Kind::of_either(file)? {
         Kind::Swarm if ranks.is_some() => return Err(RanksError::Swarm.into()),
         Kind::Swarm => {
-            let swarm = SwarmFileArguments { swarm: file.clone(), set: set.clone() }.load()?;
+            let swarm = SwarmFileArguments::new(file, set).load()?;
             let plan = SwarmPlan::new(&swarm)?;
             (plan.to_string(), json!(plan))
         }
         Kind::Scene => {
             let count = ranks.map_or(1, usize::from);
             let parts = |scene: &Scene| if laid_out_whole_for(scene).is_none() { count } else { 1 };
-            let scene = SceneArguments { scene: file.clone(), set: set.clone() }.load_part(&[], parts)?;
+            let scene = SceneArguments::new(file, set).load_part(&[], parts)?;
             let parts = PartShares::new(&scene, count)?;
             let of_parts = parts.map(|parts| parts.facts(of_part(&parts.largest, count)));
             if let (Some(facts), Err(too_large)) = (&of_parts, require(&scene, at_least(&scene))) {

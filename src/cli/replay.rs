@@ -7,6 +7,7 @@ use clap::Args;
 use flockform::record::Reader;
 use flockform::record::replay::{Report, recorded_swarm, replay as fly_again};
 
+use super::names::Overrides;
 use super::swarm::SwarmFileArguments;
 use super::{FAILED, Refusal, print, say};
 
@@ -14,12 +15,11 @@ use super::{FAILED, Refusal, print, say};
 pub struct ReplayArguments {
     /// MCAP file written by --record or by `ros2 bag record -s mcap`
     recording: PathBuf,
-    /// Bundled swarm or swarm file to use [default: the one in the recording]
+    /// Bundled swarm or swarm file to use [default: the one in the recording, with the keys that it overrides]
     #[arg(long, value_name = "SWARM")]
     swarm: Option<String>,
-    /// Override a key of the swarm, after those of the recording
-    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
-    set: Vec<String>,
+    #[command(flatten)]
+    overrides: Overrides,
     /// Largest distance in metres between a target and the recorded one that counts as none
     #[arg(long, value_name = "METRES", default_value = "1e-6", value_parser = tolerance)]
     tolerance: f64,
@@ -37,8 +37,8 @@ fn tolerance(text: &str) -> Result<f64, String> {
 pub fn replay(arguments: &ReplayArguments) -> Result<ExitCode, Refusal> {
     let reader = Reader::open(&arguments.recording)?;
     let swarm = match &arguments.swarm {
-        Some(swarm) => SwarmFileArguments { swarm: swarm.clone(), set: arguments.set.clone() }.load()?,
-        None => recorded_swarm(&reader, &arguments.set)?,
+        Some(swarm) => SwarmFileArguments::new(swarm, &arguments.overrides.set).load()?,
+        None => recorded_swarm(&reader, &arguments.overrides.set)?,
     };
     let report = fly_again(&reader, &swarm, arguments.tolerance)?;
     if arguments.json {

@@ -1,7 +1,6 @@
 //! `flockform run`: plan, step, record, write; or go on where an earlier run was killed.
 
 mod observer;
-mod parts;
 mod recorder;
 mod words;
 
@@ -14,6 +13,7 @@ use clap::Args;
 use flockform::continuum::digest::{digest, digest_of_parts, fnv1a};
 use flockform::continuum::equilibrium::run_to_equilibrium_shared;
 use flockform::continuum::looks::Looks;
+use flockform::continuum::parts::laid_out_whole_for;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, SharedError, StopReason, require_shareable};
 use flockform::continuum::shares::bytes_each;
@@ -37,21 +37,21 @@ use words::{closing_words, where_to_look};
 
 use super::checkpoint::{CheckpointArguments, Checkpointer, ResumedRun, resume_words};
 use super::film::{BodyFilmArguments, Finish};
-use super::names::{FileName, SceneArguments, in_full};
+use super::names::{FileName, Overrides, SceneArguments, in_full};
 use super::output::{FigureArguments, OutputArguments, ReportArguments, command_line};
 use super::progress::Progress;
-use super::ranks::{self, Interrupted, Start};
+use super::ranks::{self, Interrupted, RanksError, Start};
 use super::recording::{RecordArguments, close};
 use super::{FAILED, Refusal, interrupt, memory};
 
 #[derive(Debug, Args)]
+#[command(mut_arg("set", |set| set.requires("scene")))]
 pub struct RunArguments {
     /// Name of a bundled scene (see `flockform list scenes`) or path of a scene file; not with --resume
     #[arg(required_unless_present = "resume", value_parser = FileName::SCENE, hide_possible_values = true)]
     scene: Option<String>,
-    /// Override a key of the scene, validated like the file: `lattice.spacing=0.5`, `roles[1].from=30`
-    #[arg(long = "set", value_name = "KEY.PATH=VALUE", requires = "scene")]
-    set: Vec<String>,
+    #[command(flatten)]
+    overrides: Overrides,
     #[command(flatten)]
     output: OutputArguments,
     #[command(flatten)]
@@ -85,10 +85,7 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     // The others wait already: a rank without threads has to tell them.
     let pool = pool.map_err(|error| Start::new(team.as_ref()).refused(Refusal::threads(threads, error)))?;
-    pool.install(|| match team.as_ref() {
-        Some(team) if !team.is_first() => help_to_run(arguments, team),
-        team => run_here(arguments, team),
-    })
+    pool.install(|| run_here(arguments, team.as_ref()))
 }
 
 /// A run that is about to begin.
@@ -108,7 +105,7 @@ impl Prepared {
     fn new(arguments: &RunArguments, team: Option<&Team>, begin: &mut Start<'_>) -> Result<Self, Refusal> {
         let mut left = arguments.checkpoints.left()?;
         let asked = arguments.asked(left.as_ref());
-        let words_of = SceneArguments { scene: asked.scene.clone(), set: asked.set.clone() };
+        let words_of = SceneArguments::new(&asked.scene, &asked.set);
         let parts = |scene: &Scene| if arguments.is_parted(scene) { team.map_or(1, Team::count) } else { 1 };
         let scene = words_of.load_part(&[], parts)?;
         // Before a choice, which solves the scene several times.
@@ -151,106 +148,114 @@ impl Prepared {
     }
 }
 
-/// The part of a rank that neither prints nor writes.
-fn help_to_run(arguments: &RunArguments, team: &Team) -> Result<ExitCode, Refusal> {
-    let mut begin = Start::new(Some(team));
-    let start = Instant::now();
-    let prepared = match Prepared::new(arguments, Some(team), &mut begin) {
-        Ok(prepared) => prepared,
-        Err(refusal) => return Err(begin.refused(refusal)),
-    };
-    if prepared.is_parted {
-        return parts::run(arguments, team, prepared, begin, start);
-    }
+/// The part of a rank that neither prints nor writes, and has the whole body.
+fn help_to_run(prepared: Prepared, team: &Team, begin: Start<'_>) -> Result<ExitCode, Refusal> {
     let common = prepared.common();
-    begin.agree(common)?;
     let mut observer = Interrupted(interrupt::serves());
     begin.begin(common)?;
     let from = prepared.left.map(|left| left.checkpoint).map(|from| (from.engine, from.residual));
     // The first rank says how it ended, in its exit code too: all have the same.
     run_to_equilibrium_shared(&prepared.scene, prepared.plan, from, team, &mut observer)
-        .map_err(|_| ranks::RanksError::SaidElsewhere)?;
+        .map_err(|_| RanksError::SaidElsewhere)?;
     Ok(ExitCode::SUCCESS)
 }
 
 fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, Refusal> {
     let start = Instant::now();
     let mut begin = Start::new(team);
-    let prepared = Prepared::new(arguments, team, &mut begin)?;
-    if let (Some(team), true) = (team, prepared.is_parted) {
-        return parts::run(arguments, team, prepared, begin, start);
-    }
+    let prepared = match Prepared::new(arguments, team, &mut begin) {
+        Ok(prepared) => prepared,
+        Err(refusal) => return Err(begin.refused(refusal)),
+    };
     let common = team.map_or(0, |_| prepared.common());
-    let Prepared { left, asked, scene, words, plan, digest, .. } = prepared;
     begin.agree(common)?;
+    let others = team.filter(|team| !team.is_first());
+    if let (Some(team), false) = (others, prepared.is_parted) {
+        return help_to_run(prepared, team, begin);
+    }
+    let Prepared { left, asked, scene, words, mut plan, digest, is_parted } = prepared;
     let shown = arguments.publish.as_ref();
     let open = |name: &String| Positions::open(&Domain::from_environment()?, name, plan.count());
     let shown = shown.map(open).transpose()?;
     let required = |colour| film::run::require_colour(&scene, colour);
     let film = arguments.film.open(&arguments.output, required)?;
-    let mut folder = match &left {
-        Some(left) => left.open()?,
-        None => arguments.output.folder(&scene.name)?,
-    };
-    // A resumed run is described by how it began.
-    folder.set_command(command_line(asked.arguments()));
+    let folder = others.is_none().then(|| match &left {
+        Some(left) => left.open(),
+        None => arguments.output.folder(&scene.name),
+    });
+    let mut folder = folder.transpose()?;
+    if let Some(folder) = &mut folder {
+        // A resumed run is described by how it began.
+        folder.set_command(command_line(asked.arguments()));
+    }
     let setup = start.elapsed();
-    tracing::info!("planned {} particles of `{}` in {setup:.1?}", plan.count(), scene.name);
+    let (own, total) = (plan.setup.body.owned().len(), plan.setup.body.total());
+    tracing::info!("planned {own} of {total} particles of `{}` in {setup:.1?}", scene.name);
     tracing::info!("{}", flockform::sweep::chosen_here());
 
-    let recorder =
-        Recorder::new(&scene, &plan, &folder, left.as_ref(), (arguments.outputs(), film.is_some()))?;
+    let outputs = (arguments.outputs(), film.is_some());
+    let recorder = Recorder::new(&scene, &plan, folder.as_ref(), left.as_ref(), outputs)?;
     let about = About { source: "run", name: scene.name.clone(), ..About::default() };
     let recording = arguments.record.open(&about, arguments.output.force, 1)?;
     let messages = recording.as_ref().map(|one| BodyMessages::new(&scene, one.sink())).transpose()?;
-    let progress = Progress::of_steps(arguments.output.quiet, steps_of(&scene));
-    let interrupted = interrupt::keeps();
-    let looks = Looks::new(&plan, shown.is_some() || messages.is_some());
-    let checkpointer = Checkpointer::new(&arguments.checkpoints, (asked, &scene, digest), left.as_ref());
+    let quiet = arguments.output.quiet || folder.is_none();
     let mut observer = RunObserver {
         recorder,
+        looks: Looks::new(&plan, shown.is_some() || messages.is_some()),
         shown,
         messages,
-        progress,
-        checkpointer,
-        folder: &mut folder,
-        looks,
-        interrupted,
+        progress: Progress::of_steps(quiet, steps_of(&scene)),
+        checkpointer: Checkpointer::new(&arguments.checkpoints, (asked, &scene, digest), left.as_ref()),
+        interrupted: if folder.is_some() { interrupt::keeps() } else { interrupt::serves() },
+        folder,
     };
     begin.begin(common)?;
+    if let (Some(probes), Some(left)) = (&mut plan.setup.probes, &left) {
+        *probes = left.checkpoint.probes.to_vec();
+    }
     let from = left.map(|left| left.checkpoint).map(|Checkpoint { engine, residual, .. }| (engine, residual));
     let outcome = run_to_equilibrium_shared(&scene, plan, from, team, &mut observer);
-    let outcome = outcome.map_err(|error| match error {
-        SharedError::Scene(error) => Refusal::from(error),
-        error => ResumedRun::foreign(observer.folder, &error).into(),
+    let outcome = outcome.map_err(|error| match (error, &observer.folder) {
+        (_, None) => RanksError::SaidElsewhere.into(),
+        (SharedError::Scene(error), _) => Refusal::from(error),
+        (error, Some(folder)) => ResumedRun::foreign(folder, &error).into(),
     })?;
-    let RunObserver { mut recorder, messages, progress, checkpointer, .. } = observer;
+    let RunObserver { mut recorder, messages, progress, checkpointer, mut folder, .. } = observer;
     progress.finish();
     if let Some(messages) = messages {
         messages.finish(&outcome.engine, outcome.residual);
     }
 
-    let elapsed = checkpointer.stepping();
-    tracing::info!("{} steps in {elapsed:.1?}, writing", outcome.engine.step());
+    let (engine, elapsed) = (&outcome.engine, checkpointer.stepping());
+    tracing::info!("{} steps in {elapsed:.1?}, writing", engine.step());
     let is_interrupted = outcome.reason == StopReason::Interrupted;
-    let is_small = outcome.engine.body().count() <= QUICKLY_WRITTEN;
+    let is_small = engine.body().total() <= QUICKLY_WRITTEN;
     let mut saving = is_interrupted.then(interrupt::saving);
-    if is_interrupted || elapsed > WORTH_KEEPING {
+    // No figures are drawn of parts.
+    let is_worth_keeping = is_interrupted || (elapsed > WORTH_KEEPING && !is_parted);
+    if is_worth_keeping && !engine.any_of_parts(recorder.failed()) {
         let _saving = interrupt::saving();
-        let is_left = checkpointer.leave(&mut folder, (&outcome.engine, outcome.residual), &recorder.kept());
+        let kept = recorder.kept(engine);
+        let is_left = checkpointer.leave(folder.as_mut(), (engine, outcome.residual), &kept);
         if is_left && is_interrupted && !is_small {
-            interrupt::says_at_once(&resume_words(&folder));
+            folder.iter().for_each(|folder| interrupt::says_at_once(&resume_words(folder)));
             return Ok(ExitCode::from(FAILED));
         }
     }
     let on_the_way = recorder.writing;
-    let records = recorder.finish(&outcome)?;
+    let records = recorder.finish(&outcome);
+    // What one rank cannot write ends all.
+    let is_lost = engine.any_of_parts(records.is_err());
+    let records = records?;
+    if is_lost {
+        return Err(RanksError::SaidElsewhere.into());
+    }
     memory::return_what_is_free();
     let Records { snapshots, probes, load_steps, stage, animation, writing } = records;
     let timings = Timings { setup, steps: elapsed.saturating_sub(on_the_way), output: writing };
     let (snapshots, probes, load_steps) = (&snapshots[..], &probes[..], &load_steps[..]);
     let results = Results { scene: &scene, outcome: &outcome, snapshots, probes, load_steps, timings };
-    let progress = Progress::of_drawing(arguments.output.quiet, "figure");
+    let progress = Progress::of_drawing(quiet, "figure");
     let is_cut_short = AtomicBool::new(false);
     let show = |done: usize, of: usize| {
         progress.drawn(done, of);
@@ -261,8 +266,9 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
         ControlFlow::Continue(())
     };
     let drawing = Drawing { formats: arguments.figures.figures, progress: &show };
-    let (_, summary) = write_all(&folder, &results, drawing)?;
+    let (_, summary) = write_all(folder.as_ref(), &results, drawing)?;
     progress.finish();
+    let Some(folder) = folder else { return Ok(ExitCode::SUCCESS) };
     if let Some(stage) = stage {
         report::run::write(&folder, &results, &summary, stage)?;
     }
@@ -289,6 +295,15 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
 }
 
 impl RunArguments {
+    /// Whether each rank is to lay out a part of the body: where nothing that is asked for needs the whole.
+    fn is_parted(&self, scene: &Scene) -> bool {
+        let needs_none = self.outputs() == Outputs::TABLES
+            && !self.film.is_asked()
+            && !self.record.is_asked()
+            && self.publish.is_none();
+        needs_none && laid_out_whole_for(scene).is_none()
+    }
+
     fn outputs(&self) -> Outputs {
         Outputs { figures: self.figures.figures, report: !self.report.no_report }
     }
@@ -301,7 +316,7 @@ impl RunArguments {
             (None, None) => unreachable!("a scene is required without --resume"),
             (Some(scene), _) => {
                 let steps = self.steps.map(|steps| format!("stop.steps={steps}"));
-                let set = self.set.iter().cloned().chain(steps).collect();
+                let set = self.overrides.set.iter().cloned().chain(steps).collect();
                 RunRequest { scene: in_full(scene), set, force }
             }
         }

@@ -21,7 +21,7 @@ use flockform::swarm::flight::{Flight, FlightReport, Record, Sample, fly_with_ob
 use flockform::swarm::plan::cautions;
 
 use super::film::{Finish, SwarmFilmArguments};
-use super::names::{FileName, Kind, folder_of};
+use super::names::{FileName, Kind, Overrides, folder_of};
 use super::output::{OutputArguments, ReportArguments};
 use super::recording::{RecordArguments, close};
 use super::{FAILED, Refusal, interrupt, on_terminal};
@@ -32,18 +32,21 @@ pub struct SwarmFileArguments {
     /// Name of a bundled swarm (see `flockform list swarms`) or path of a swarm file
     #[arg(value_parser = FileName::SWARM, hide_possible_values = true)]
     pub swarm: String,
-    /// Override a key of the swarm, validated like the file: `limits.speed=0.5`, `leaders[0].program.kind=external`
-    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
-    pub set: Vec<String>,
+    #[command(flatten)]
+    pub overrides: Overrides,
 }
 
 impl SwarmFileArguments {
+    pub fn new(swarm: &str, set: &[String]) -> Self {
+        Self { swarm: swarm.to_owned(), overrides: Overrides { set: set.to_vec() } }
+    }
+
     pub fn load(&self) -> Result<Swarm, Refusal> {
         if let Some(bundled) = bundled_swarm(&self.swarm) {
-            return Ok(bundled.load_swarm(&self.set)?);
+            return Ok(bundled.load_swarm(&self.overrides.set)?);
         }
         let path = Kind::Swarm.path(&self.swarm)?;
-        Swarm::from_file(&path, &self.set)
+        Swarm::from_file(&path, &self.overrides.set)
             .map_err(|error| Kind::Swarm.refuse_other(&self.swarm).unwrap_or(error.into()))
     }
 
@@ -58,7 +61,7 @@ impl SwarmFileArguments {
             source,
             name: swarm.name.clone(),
             swarm: text,
-            set: self.set.clone(),
+            set: self.overrides.set.clone(),
             folder: folder.and_then(|folder| std::path::absolute(folder.join(".")).ok()),
             ..About::default()
         }

@@ -17,11 +17,12 @@ use flockform::study::design::{Design, Sampling, Shard};
 use runs::Runs;
 
 use super::material::wrong;
-use super::names::{FileName, SceneArguments, in_full};
+use super::names::{FileName, Overrides, SceneArguments, in_full};
 use super::output::{FigureArguments, OutputArguments};
 use super::{FAILED, Refusal, interrupt, print, say};
 
 #[derive(Debug, Args)]
+#[command(mut_arg("set", |set| set.requires("scene")))]
 pub struct SweepArguments {
     /// Name of a bundled scene (see `flockform list scenes`) or path of a scene file; not with --resume or --merge
     #[arg(
@@ -30,9 +31,8 @@ pub struct SweepArguments {
         hide_possible_values = true
     )]
     scene: Option<String>,
-    /// Override a key of the scene in every run, validated like the file
-    #[arg(long = "set", value_name = "KEY.PATH=VALUE", requires = "scene")]
-    set: Vec<String>,
+    #[command(flatten)]
+    overrides: Overrides,
     /// Vary a key: FROM:TO:COUNT (a grid; with :log by ratios), [VALUE, ...], or FROM:TO with --samples. Keys given
     /// together make every combination
     #[arg(long, value_name = "KEY.PATH=VALUES", requires = "scene", required_unless_present_any = ["resume", "merge"])]
@@ -83,7 +83,7 @@ impl SweepArguments {
     fn request(&self) -> Result<SweepRequest, Refusal> {
         Ok(SweepRequest {
             scene: in_full(self.scene.as_deref().unwrap_or_default()),
-            set: self.set.clone(),
+            set: self.overrides.set.clone(),
             vary: self.vary.clone(),
             samples: self.samples.map(|count| (count as usize, self.sampling, self.seed)),
             outputs: self.outputs.clone(),
@@ -203,7 +203,7 @@ fn in_words(reason: &str) -> &str {
 }
 
 fn scene_arguments(request: &SweepRequest) -> SceneArguments {
-    SceneArguments { scene: request.scene.clone(), set: request.set.clone() }
+    SceneArguments::new(&request.scene, &request.set)
 }
 
 /// Makes the runs, goes on with them, or puts shards together.

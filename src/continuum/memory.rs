@@ -117,7 +117,7 @@ pub fn measured(plan: &Plan) -> usize {
 
 /// Entries of the neighbour lists; where they are found anew at every step, about as many as the
 /// radius holds at the reference density.
-pub fn neighbour_entries(plan: &Plan) -> usize {
+pub(crate) fn neighbour_entries(plan: &Plan) -> usize {
     match plan.setup.present_radius {
         None => plan.setup.flock.neighbours.index.len(),
         Some(radius) => {

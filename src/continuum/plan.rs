@@ -142,7 +142,7 @@ impl Plan {
     ///
     /// # Errors
     /// As [`Plan::new`], but for that.
-    pub fn of_part_alone(scene: &Scene, parting: &Parting, rank: usize) -> Result<Self, SceneError> {
+    pub(crate) fn of_part_alone(scene: &Scene, parting: &Parting, rank: usize) -> Result<Self, SceneError> {
         Self::of_layout(scene, parting.lay_out(scene, rank)?, None)
     }
 

@@ -287,7 +287,7 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
 }
 
 /// The warning about a pressure on a body that turns, if there is one.
-pub fn dead_pressure(scene: &Scene) -> Option<String> {
+pub(crate) fn dead_pressure(scene: &Scene) -> Option<String> {
     let presses = scene.raw.loads.iter().any(|load| matches!(load, RawLoad::Pressure { .. }));
     (presses && scene.rotation() == Rotation::Corotated).then(|| {
         "pressure acts along the normals of the undeformed outline, on its undeformed length: it does not follow a body \

@@ -82,7 +82,7 @@ impl Forces {
     }
 
     /// The force that the body does not balance on a particle \[force\]: on one that is held, less its reaction.
-    pub fn left_on(&self, particle: usize) -> [f64; 2] {
+    pub(crate) fn left_on(&self, particle: usize) -> [f64; 2] {
         plus(self.internal.get(particle), self.loads.get(particle))
     }
 
@@ -138,7 +138,7 @@ impl Forces {
     }
 
     /// The resultant of each load.
-    pub fn each_load(&self, engine: &Engine) -> Vec<LoadResultant> {
+    pub(crate) fn each_load(&self, engine: &Engine) -> Vec<LoadResultant> {
         engine.each_load().iter().map(|whole| self.resultant(engine, whole)).collect()
     }
 
@@ -159,7 +159,7 @@ impl Forces {
     }
 
     /// Forces times the displacements \[force length\].
-    pub fn work_of(&self, forces: &Vectors, engine: &Engine) -> f64 {
+    pub(crate) fn work_of(&self, forces: &Vectors, engine: &Engine) -> f64 {
         let work = |i: usize| [dot(forces.get(i), self.displacement.get(i))];
         let [work] = engine.sum_of_parts([-0.0], engine.body().owned().map(work));
         work
@@ -176,7 +176,7 @@ impl Forces {
 
     /// The largest force that is left on a follower, along components that are free \[force\]: none where the body is
     /// at rest.
-    pub fn largest_left(&self, engine: &Engine) -> f64 {
+    pub(crate) fn largest_left(&self, engine: &Engine) -> f64 {
         let mut free = vec![[true; 2]; engine.roles().len()];
         for Held { particle, axes } in held(engine).into_iter().flatten() {
             (0..2).filter(|&axis| axes[axis]).for_each(|axis| free[particle][axis] = false);

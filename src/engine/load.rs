@@ -32,22 +32,22 @@ impl Load {
 
 impl Engine {
     /// Part of the scene's loads that is on the body now \[1\].
-    pub fn load_factor(&self) -> f64 {
+    pub(crate) fn load_factor(&self) -> f64 {
         self.load.factor
     }
 
     /// All of the scene's loads \[force\], shape \[count\]; `None` without loads.
-    pub fn whole_load(&self) -> Option<&Vectors> {
+    pub(crate) fn whole_load(&self) -> Option<&Vectors> {
         self.load.whole.as_ref().or(self.flock.forces.as_ref())
     }
 
     /// The whole of each of the scene's loads \[force\], shape \[loads\]\[count\].
-    pub fn each_load(&self) -> &[Vectors] {
+    pub(crate) fn each_load(&self) -> &[Vectors] {
         &self.load.each
     }
 
     /// Puts this part of the scene's loads on the body \[1\].
-    pub fn set_load_factor(&mut self, factor: f64) {
+    pub(crate) fn set_load_factor(&mut self, factor: f64) {
         if factor == self.load.factor {
             return;
         }

@@ -200,7 +200,7 @@ impl Engine {
     }
 
     /// The known tractions along the outline, where stress can be recovered from it.
-    pub fn free_edge(&self) -> Option<&Edge> {
+    pub(crate) fn free_edge(&self) -> Option<&Edge> {
         self.free_edge.as_ref()?.of(&self.body, self.cells.as_ref()?)
     }
 
@@ -340,7 +340,7 @@ impl Engine {
     }
 
     /// Counts the way to the equilibrium that the body was put to, under the load that is on it now, as gone.
-    pub fn extend_path(&mut self) {
+    pub(crate) fn extend_path(&mut self) {
         let mut path = self.path.take().unwrap_or_default();
         path.extend(self);
         self.path = Some(path);
@@ -352,12 +352,12 @@ impl Engine {
     }
 
     /// Takes the last step back: positions as before it. A shared body must have been [gathered](Engine::gather). Bonds that broke in it stay broken.
-    pub fn undo_step(&mut self) {
+    pub(crate) fn undo_step(&mut self) {
         self.return_to(self.step - 1, &self.previous.clone(), self.activity.clone());
     }
 
     /// Whether a role change or a leader's motion is still to come, so that rest is no equilibrium.
-    pub fn is_scheduled(&self) -> bool {
+    pub(crate) fn is_scheduled(&self) -> bool {
         let waits = |change: &RoleChange| change.when.is_none() && change.from > self.step.max(1);
         self.changes.iter().any(waits)
             || self.next_action().is_some()
@@ -367,8 +367,7 @@ impl Engine {
     }
 
     fn any_leader_goes_on(&self) -> bool {
-        let own = self.leaders.iter().any(|led| self.goes_on(led));
-        self.parted().map_or(own, |team| team.any(own))
+        self.any_of_parts(self.leaders.iter().any(|led| self.goes_on(led)))
     }
 
     /// Looks over the last step.

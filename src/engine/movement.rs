@@ -72,7 +72,7 @@ fn exactly(part: Range<usize>, [present, previous, reference]: [&Vectors; 3], sp
 }
 
 /// Index of the first of these particles whose position is not finite.
-pub fn first_lost(present: &Vectors, mut among: Range<usize>) -> Option<usize> {
+pub(crate) fn first_lost(present: &Vectors, mut among: Range<usize>) -> Option<usize> {
     among.find(|&i| !present.get(i).iter().all(|place| place.is_finite()))
 }
 

@@ -66,14 +66,14 @@ pub struct RoleChange {
 
 impl RoleChange {
     /// Whether the particles have the role before the first step.
-    pub fn is_at_once(&self) -> bool {
+    pub(crate) fn is_at_once(&self) -> bool {
         self.from <= 1 && self.when.is_none()
     }
 }
 
 /// What `of` makes, for each component of each particle, of the change that gives it its role before the first step,
 /// the last one that names it, shape \[count\]\[x, y\].
-pub fn of_first_roles<T: Copy + Default>(
+pub(crate) fn of_first_roles<T: Copy + Default>(
     changes: &[RoleChange],
     count: usize,
     of: impl Fn(usize, &RoleChange) -> T,

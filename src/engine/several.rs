@@ -188,7 +188,7 @@ impl Reach {
 }
 
 /// Whether something of a body depends on how it stands in each step: then steps are taken one at a time.
-pub fn looks_at_every_step(finds_neighbours: bool, flock: &Flock, changes: &[RoleChange]) -> bool {
+pub(crate) fn looks_at_every_step(finds_neighbours: bool, flock: &Flock, changes: &[RoleChange]) -> bool {
     finds_neighbours
         || flock.bonds.as_ref().is_some_and(|bonds| bonds.threshold.is_some())
         || changes.iter().any(|change| change.when.is_some())

@@ -126,7 +126,7 @@ impl Engine {
     }
 
     /// The largest over the parts of the body.
-    pub fn largest_of_parts<const N: usize>(&self, own: [f64; N]) -> [f64; N] {
+    pub(crate) fn largest_of_parts<const N: usize>(&self, own: [f64; N]) -> [f64; N] {
         self.parted().map_or(own, |team| team.largest(own))
     }
 
@@ -136,7 +136,7 @@ impl Engine {
     }
 
     /// What `start` and the numbers of this part, which are its `own`, and those of the others add up to, in the order of the parts.
-    pub fn sum_of_parts<const N: usize>(
+    pub(crate) fn sum_of_parts<const N: usize>(
         &self,
         start: [f64; N],
         own: impl Iterator<Item = [f64; N]>,
@@ -153,13 +153,18 @@ impl Engine {
         .map(f64::from_bits)
     }
 
+    /// Whether it is so in any part of the body.
+    pub fn any_of_parts(&self, own: bool) -> bool {
+        self.parted().map_or(own, |team| team.any(own))
+    }
+
     /// How many there are in all parts.
-    pub fn count_of_parts(&self, own: usize) -> usize {
+    pub(crate) fn count_of_parts(&self, own: usize) -> usize {
         self.parted().map_or(own, |team| team.sum([own as u64])[0] as usize)
     }
 
     /// The cells that belong to this part of the body, as their first corners do; all of a whole one.
-    pub fn owned_cells(&self) -> Range<usize> {
+    pub(crate) fn owned_cells(&self) -> Range<usize> {
         let owned = self.body.owned();
         let of = |cells: &Cells| match self.body.part {
             Some(_) => cells.before(owned.start)..cells.before(owned.end),
@@ -169,7 +174,7 @@ impl Engine {
     }
 
     /// The id of the first particle whose position is not finite.
-    pub fn first_lost(&self) -> Option<usize> {
+    pub(crate) fn first_lost(&self) -> Option<usize> {
         let own = movement::first_lost(&self.present, self.body.owned()).map(|i| self.body.id(i));
         let Some(team) = self.parted() else { return own };
         let ids = team.each([own.map_or(u64::MAX, |id| id as u64)]).into_iter().flatten().min();
@@ -227,7 +232,12 @@ pub(super) fn take_steps(
 
 /// The bonds that break in the whole body, in its order, of those that each rank has found among its own particles, by the numbers
 /// that these have here.
-pub fn of_all_parts(team: &Team, body: &Body, neighbours: &Neighbours, found: Vec<Break>) -> Vec<Break> {
+pub(crate) fn of_all_parts(
+    team: &Team,
+    body: &Body,
+    neighbours: &Neighbours,
+    found: Vec<Break>,
+) -> Vec<Break> {
     let (first, owned) = (body.first(), body.owned());
     // Of a bond between two parts, which both find, the one speaks that records it.
     let is_own =

@@ -24,11 +24,13 @@ use serde_json::Value;
 
 use super::error::ExportError;
 use super::manifest::create;
+use super::parts::write_each;
 use super::report::AnimationState;
 use crate::continuum::digest::fnv1a;
 use crate::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use crate::engine::setup::Setup;
 use crate::engine::state::EngineState;
+use crate::ranks::Team;
 use crate::scene::Scene;
 
 /// Its name in the folder of the run.
@@ -208,30 +210,36 @@ impl<'a> Checkpoint<'a> {
         }
     }
 
-    /// Writes the state of a rank's part, for the checkpoint of the first rank to name it.
-    pub fn write_part(&self, folder: &Path, rank: usize) -> Result<(), ExportError> {
-        let path = folder.join(part_name(self.engine.step(), rank));
-        let write = || self.write_to(create(&path)?)?.sync_all();
-        write().map_err(ExportError::io("write", &path))
-    }
-
-    /// Takes the place of the former checkpoint when the states of all ranks are on the disk; `firsts` and `counts` are those
-    /// of their particles, shape \[ranks\]. Those of former checkpoints are removed.
-    pub fn write_with_parts(mut self, folder: &Path, parts: &[(usize, usize)]) -> Result<(), ExportError> {
+    /// The checkpoint of a body of which each rank has a part, made by all ranks together: the others write their states, each
+    /// that of the particles from the number `first` of the whole body on, into the `folder` of the first one, which names them.
+    ///
+    /// # Errors
+    /// A state that cannot be written, by any rank, or what the first one says of its own: `ready`.
+    pub fn with_parts(
+        mut self,
+        folder: Option<&Path>,
+        (first, team): (usize, &Team),
+        ready: Result<(), ExportError>,
+    ) -> Result<Self, ExportError> {
         let step = self.engine.step();
-        let other = |(rank, &(first, count)): (usize, &(usize, usize))| OtherPart {
-            file: part_name(step, rank),
-            first,
-            count,
+        let name = |rank: usize| part_name(step, rank);
+        let write = |path: &Path| -> io::Result<()> { self.write_to(create(path)?)?.sync_all() };
+        write_each(folder, name, team, |path| match folder {
+            Some(_) => ready,
+            None => write(path).map_err(ExportError::io("write", path)),
+        })?;
+        let parts = team.each([first as u64, self.engine.count() as u64]).into_iter().enumerate();
+        let part = |(rank, [first, count]): (usize, [u64; 2])| OtherPart {
+            file: name(rank),
+            first: first as usize,
+            count: count as usize,
         };
-        self.parts.others = parts.iter().enumerate().skip(1).map(other).collect();
-        self.write(folder)?;
-        let is_named = |name: &str| self.parts.others.iter().any(|other| other.file == name);
-        remove_parts(folder, is_named);
-        Ok(())
+        self.parts.others = parts.skip(1).map(part).collect();
+        Ok(self)
     }
 
-    /// Takes the place of the former checkpoint in the folder when it is whole on the disk.
+    /// Takes the place of the former checkpoint in the folder when it is whole on the disk, as those of all parts are; parts of
+    /// the former one are removed.
     pub fn write(&self, folder: &Path) -> Result<(), ExportError> {
         let (part, path) = (folder.join(PART), folder.join(FILE));
         let write = || {
@@ -243,7 +251,9 @@ impl<'a> Checkpoint<'a> {
             // On a full disk half of one is in the way of what is to come.
             let _ = fs::remove_file(&part);
             ExportError::io("write", &path)(error)
-        })
+        })?;
+        remove_parts(folder, |name| self.parts.others.iter().any(|other| other.file == name));
+        Ok(())
     }
 
     /// As it is written, so that it is never in memory beside the run; the header comes last, over its place.

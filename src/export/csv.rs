@@ -20,7 +20,6 @@ use crate::engine::Engine;
 use crate::flock::body::Body;
 use crate::flock::fracture::Break;
 use crate::material::stress::StressState;
-use crate::ranks::Team;
 
 #[derive(Serialize)]
 struct FinalRow {
@@ -84,45 +83,30 @@ struct ResidualRow {
 /// strain \[1\] and the rotation \[rad\] of its surroundings, empty where it sees too few. Where the scene has a material,
 /// `stresses` follow \[force / length^2\]: the mean over the particle's cells, each weighted by its area, and the von
 /// Mises stress of that mean. Such a mean lies below a peak at a free edge or a notch.
-pub fn write_final(
-    folder: &OutputFolder,
-    engine: &Engine,
-    stresses: Option<&[Option<StressState>]>,
-) -> Result<PathBuf, ExportError> {
-    let path = folder.path(FINAL);
-    let write = || write_rows(Writer::from_writer(create(&path)?), final_rows(engine, stresses));
-    write().map_err(ExportError::io("write", &path))?;
-    Ok(path)
-}
-
-/// Writes every particle at the end of a body of which each rank has a part: by all ranks together, into the `folder` of the
-/// first one, which receives the rows of the others in pieces.
 ///
-/// # Errors
-/// The first rank's, if the file cannot be written.
-pub fn write_final_of_parts(
+/// Where each rank has a part of the body all ranks write it together, into the `folder` of the first one, which receives the
+/// rows of the others in pieces; it alone can fail.
+pub(super) fn write_final(
     folder: Option<&OutputFolder>,
     engine: &Engine,
     stresses: Option<&[Option<StressState>]>,
-    team: &Team,
-) -> Result<(), ExportError> {
-    let rows = || final_rows(engine, stresses);
+) -> Result<Option<PathBuf>, ExportError> {
+    let (mut rows, team) = (final_rows(engine, stresses).peekable(), engine.parted());
     let Some(folder) = folder else {
-        let mut rows = rows().peekable();
+        let Some(team) = team else { return Ok(None) };
         while rows.peek().is_some() {
-            let piece = rows.by_ref().take(ROWS_OF_A_PIECE);
-            team.send_bytes(&text_of(piece).unwrap_or_default());
+            team.send_bytes(&text_of(rows.by_ref().take(ROWS_OF_A_PIECE)).unwrap_or_default());
         }
         team.send_bytes(&[]);
-        return Ok(());
+        return Ok(None);
     };
-    let path = folder.path(FINAL);
+    let path = folder.path("final.csv");
     let mut file = create(&path).and_then(|file| {
         let mut file = BufWriter::new(file);
-        write_rows(Writer::from_writer(&mut file), rows()).map(|()| file)
+        write_rows(Writer::from_writer(&mut file), rows).map(|()| file)
     });
     // What the others send is received in any case: they wait until it is.
-    for rank in 1..team.count() {
+    for (team, rank) in team.iter().flat_map(|team| (1..team.count()).map(move |rank| (team, rank))) {
         loop {
             let piece = team.receive_bytes(rank);
             if piece.is_empty() {
@@ -131,10 +115,9 @@ pub fn write_final_of_parts(
             file = file.and_then(|mut file| file.write_all(&piece).map(|()| file));
         }
     }
-    file.and_then(|mut file| file.flush()).map_err(ExportError::io("write", &path))
+    file.and_then(|mut file| file.flush()).map_err(ExportError::io("write", &path))?;
+    Ok(Some(path))
 }
-
-const FINAL: &str = "final.csv";
 
 /// Rows that a rank sends at once.
 const ROWS_OF_A_PIECE: usize = 1 << 13;
@@ -188,7 +171,11 @@ fn final_rows(engine: &Engine, stresses: Option<&[Option<StressState>]>) -> impl
 /// Writes every broken bond in the order they broke: its step (0 for those cut before the first), its
 /// two particles, its middle in the reference configuration \[length\] and along the body \[1\], and the
 /// length at which it broke \[length\].
-pub fn write_breaks(folder: &OutputFolder, body: &Body, breaks: &[Break]) -> Result<PathBuf, ExportError> {
+pub(crate) fn write_breaks(
+    folder: &OutputFolder,
+    body: &Body,
+    breaks: &[Break],
+) -> Result<PathBuf, ExportError> {
     let along = body.along();
     let rows = breaks.iter().map(|one| {
         let [id_a, id_b] = body.ids(one.pair);
@@ -200,7 +187,7 @@ pub fn write_breaks(folder: &OutputFolder, body: &Body, breaks: &[Break]) -> Res
 }
 
 /// Writes the residual before the first iteration of a solver and after each.
-pub fn write_residuals(folder: &OutputFolder, residuals: &[f64]) -> Result<PathBuf, ExportError> {
+pub(crate) fn write_residuals(folder: &OutputFolder, residuals: &[f64]) -> Result<PathBuf, ExportError> {
     let row = |(iteration, &residual): (usize, &f64)| ResidualRow { iteration, residual };
     write(folder, "residuals.csv", residuals.iter().enumerate().map(row))
 }

@@ -30,7 +30,11 @@ use crate::scene::Scene;
 use crate::scene::units::Units;
 
 /// Writes a row for each step that was kept.
-pub fn write_load(folder: &OutputFolder, scene: &Scene, steps: &[LoadStep]) -> Result<PathBuf, ExportError> {
+pub(crate) fn write_load(
+    folder: &OutputFolder,
+    scene: &Scene,
+    steps: &[LoadStep],
+) -> Result<PathBuf, ExportError> {
     let path = folder.path("load.csv");
     let failed = |error: csv::Error| ExportError::io("write", &path)(error);
     let file = create(&path).map_err(ExportError::io("write", &path))?;

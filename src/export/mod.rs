@@ -68,6 +68,7 @@ mod folder;
 pub mod load;
 pub(crate) mod manifest;
 pub mod memory;
+mod parts;
 pub mod report;
 #[cfg(feature = "bench")]
 pub mod scale;
@@ -140,22 +141,48 @@ impl Default for Drawing<'_> {
 /// Writes tables, figures and, last, the summary, which has the time that the others took. Returns the
 /// paths within the folder under its temporary name, and the summary.
 ///
+/// Where each rank has a part of the body all ranks write together, the first one into its `folder`; it alone can fail.
+///
 /// # Errors
 /// The first file that cannot be written.
-pub fn write_all(
-    folder: &OutputFolder,
+pub fn write_all<'f>(
+    folder: impl Into<Option<&'f OutputFolder>>,
     results: &Results<'_>,
     drawing: Drawing<'_>,
 ) -> Result<(Vec<PathBuf>, Summary), ExportError> {
-    let start = Instant::now();
-    let engine = &results.outcome.engine;
+    let (start, folder) = (Instant::now(), folder.into());
     let (measured, stresses) = Measured::of(results.scene, results.outcome).unzip();
     let of_particles = stresses.as_ref().map(|stresses| &stresses.particles[..]);
-    let mut written = vec![csv::write_final(folder, engine, of_particles)?];
+    let particles = csv::write_final(folder, &results.outcome.engine, of_particles);
     // Figures take memory of their own.
     drop(stresses);
-    written.extend(write_histories(folder, engine, results.probes)?);
-    if let Some(solved) = &results.outcome.solved {
+    let others = || folder.map_or(Ok(Vec::new()), |folder| write_others(folder, results, drawing));
+    let written = particles.and_then(|particles| Ok(particles.into_iter().chain(others()?).collect()));
+    let mut timings = results.timings;
+    timings.output += start.elapsed();
+    // Sums over all parts: the other ranks wait for this one even if it could not write.
+    let summary = Summary::new(results.scene, results.outcome, measured, timings);
+    let mut written: Vec<_> = written?;
+    written.extend(folder.map(|folder| summary.write(folder)).transpose()?);
+    Ok((written, summary))
+}
+
+/// All tables but that of the particles, and the figures.
+fn write_others(
+    folder: &OutputFolder,
+    results: &Results<'_>,
+    drawing: Drawing<'_>,
+) -> Result<Vec<PathBuf>, ExportError> {
+    let Outcome { engine, solved, .. } = results.outcome;
+    let (body, breaks) = (engine.body(), engine.breaks());
+    let mut written = Vec::new();
+    if !results.probes.is_empty() {
+        written.push(csv::write_probes(folder, body, results.probes)?);
+    }
+    if !breaks.is_empty() {
+        written.push(csv::write_breaks(folder, body, breaks)?);
+    }
+    if let Some(solved) = solved {
         written.push(csv::write_residuals(folder, &solved.residuals)?);
     }
     if !results.load_steps.is_empty() {
@@ -164,24 +191,7 @@ pub fn write_all(
     if drawing.formats != Formats::None {
         written.extend(draw_all(folder, results, drawing)?);
     }
-    let mut timings = results.timings;
-    timings.output += start.elapsed();
-    let summary = Summary::new(results.scene, results.outcome, measured, timings);
-    written.push(summary.write(folder)?);
-    Ok((written, summary))
-}
-
-/// The tables of probes and of broken bonds, where there are any.
-fn write_histories(
-    folder: &OutputFolder,
-    engine: &Engine,
-    probes: &[ProbeSeries],
-) -> Result<Vec<PathBuf>, ExportError> {
-    let (body, breaks) = (engine.body(), engine.breaks());
-    let probes = (!probes.is_empty()).then(|| csv::write_probes(folder, body, probes));
-    let probes = probes.transpose()?;
-    let breaks = (!breaks.is_empty()).then(|| csv::write_breaks(folder, body, breaks));
-    Ok(probes.into_iter().chain(breaks.transpose()?).collect())
+    Ok(written)
 }
 
 /// The histories of all probed particles, whose indices in the whole body are given, in their order; each rank has those of its
@@ -203,34 +213,6 @@ pub fn probes_of_parts(engine: &Engine, probes: &[usize], team: &Team) -> Vec<Pr
     }
     let of = |&index: &usize| all.iter().find(|probe| probe.particle == index).cloned();
     probes.iter().filter_map(of).collect()
-}
-
-/// Writes the tables of particles and of probes and, last, the summary of a run of which each rank has a part, by all ranks
-/// together. The first one has the `folder`; it alone can fail.
-///
-/// # Errors
-/// The first file that cannot be written.
-pub fn write_all_of_parts(
-    folder: Option<&OutputFolder>,
-    (scene, outcome, probes): (&Scene, &Outcome, &[usize]),
-    mut timings: Timings,
-    team: &Team,
-) -> Result<Summary, ExportError> {
-    let start = Instant::now();
-    let probes = probes_of_parts(&outcome.engine, probes, team);
-    let (measured, stresses) = Measured::of(scene, outcome).unzip();
-    let of_particles = stresses.as_ref().map(|stresses| &stresses.particles[..]);
-    let written = csv::write_final_of_parts(folder, &outcome.engine, of_particles, team);
-    let written = written.and_then(|()| match folder {
-        Some(folder) => write_histories(folder, &outcome.engine, &probes).map(drop),
-        None => Ok(()),
-    });
-    timings.output += start.elapsed();
-    // Sums over all parts: the others wait for this one even if it could not write.
-    let summary = Summary::new(scene, outcome, measured, timings);
-    written?;
-    folder.map_or(Ok(()), |folder| summary.write(folder).map(drop))?;
-    Ok(summary)
 }
 
 /// The strain of any particle's surroundings that is largest in size; `None` where no particle sees enough.

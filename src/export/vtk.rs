@@ -31,6 +31,7 @@ use rayon::prelude::*;
 
 use super::error::{ExportError, write_file};
 use super::manifest::{Written, create, create_buffered};
+use super::parts::write_each;
 use super::{OutputFolder, bonds};
 use crate::continuum::mechanics::Stresses;
 use crate::engine::Engine;
@@ -135,13 +136,11 @@ impl VtkSeries {
     }
 
     fn write_pieces(&mut self, engine: &Engine, team: &Team) -> Result<(), ExportError> {
-        let step = engine.step();
-        let all = self.paths(&[(step, Some(team.count()))]);
-        let folder = all[0].parent().map(Path::to_owned).unwrap_or_default();
-        team.each_bytes(folder.as_os_str().as_encoded_bytes());
-        write_own_piece(&folder, engine, team)?;
-        write_file(&all[0], list_of_pieces(step, team.count()))?;
-        self.frames.push((step, Some(team.count())));
+        let frame = (engine.step(), Some(team.count()));
+        let list = &self.paths(&[frame])[0];
+        write_own_piece(list.parent(), engine, team)?;
+        write_file(list, list_of_pieces(engine.step(), team.count()))?;
+        self.frames.push(frame);
         Ok(())
     }
 
@@ -188,23 +187,13 @@ fn piece_name(step: usize, rank: usize) -> String {
 /// # Errors
 /// A piece that cannot be written, by any rank.
 pub fn write_piece(engine: &Engine, team: &Team) -> Result<(), ExportError> {
-    let folders = team.each_bytes(&[]);
-    let folder = PathBuf::from(String::from_utf8_lossy(&folders[0]).into_owned());
-    write_own_piece(&folder, engine, team)
+    write_own_piece(None, engine, team)
 }
 
-/// The folder is that of the first rank.
-fn write_own_piece(folder: &Path, engine: &Engine, team: &Team) -> Result<(), ExportError> {
-    let path = folder.join(piece_name(engine.step(), team.rank()));
-    let written = write_frame(&path, engine, None);
-    let failed = team.each([u64::from(written.is_err())]).iter().position(|&[failed]| failed == 1);
-    match (written, failed) {
-        (Err(error), _) => Err(ExportError::io("write", &path)(error)),
-        (Ok(()), Some(rank)) => {
-            Err(ExportError::OnRank { rank, path: folder.join(piece_name(engine.step(), rank)) })
-        }
-        (Ok(()), None) => Ok(()),
-    }
+fn write_own_piece(folder: Option<&Path>, engine: &Engine, team: &Team) -> Result<(), ExportError> {
+    let name = |rank: usize| piece_name(engine.step(), rank);
+    let write = |path: &Path| write_frame(path, engine, None).map_err(ExportError::io("write", path));
+    write_each(folder, name, team, write)
 }
 
 /// What all pieces of a frame have in common, and their names.

@@ -81,7 +81,7 @@ impl CellKind {
 
     /// Local numbers of the nodes on side `side`, which runs from corner `side` to the next one
     /// counter-clockwise: start, end and, for the quadratic kinds, middle.
-    pub fn side_nodes(self, side: usize) -> impl Iterator<Item = usize> {
+    pub(crate) fn side_nodes(self, side: usize) -> impl Iterator<Item = usize> {
         let n = self.corners();
         [side, (side + 1) % n, n + side].into_iter().take(self.degree() + 1)
     }

@@ -143,7 +143,7 @@ impl Material {
     /// # Errors
     /// [`FemError::BadStiffness`] unless D is finite, symmetric to 1e-12 of its largest entry and positive
     /// definite; [`FemError::Inadmissible`] unless the thickness is above 0.
-    pub fn from_stiffness(stiffness: [[f64; 3]; 3], thickness: f64) -> Result<Material, FemError> {
+    pub(crate) fn from_stiffness(stiffness: [[f64; 3]; 3], thickness: f64) -> Result<Material, FemError> {
         positive("thickness", thickness)?;
         let d = &stiffness;
         let largest = d.iter().flatten().fold(0.0_f64, |m, v| m.max(v.abs()));

@@ -281,7 +281,7 @@ impl ShapeSolution {
     ///
     /// # Errors
     /// As [`ShapeSolution::displacements_at`].
-    pub fn displacements_within(&self, points: &[Point], reach: f64) -> Result<Vec<Point>, FemError> {
+    pub(crate) fn displacements_within(&self, points: &[Point], reach: f64) -> Result<Vec<Point>, FemError> {
         let (x, y): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p[0], p[1])).unzip();
         self.solution.displacements_within(&x, &y, reach)
     }
@@ -300,7 +300,7 @@ impl ShapeSolution {
     ///
     /// # Errors
     /// As [`ShapeSolution::displacements_at`].
-    pub fn stress_within(&self, points: &[Point], reach: f64) -> Result<Vec<Stress>, FemError> {
+    pub(crate) fn stress_within(&self, points: &[Point], reach: f64) -> Result<Vec<Stress>, FemError> {
         let (x, y): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p[0], p[1])).unzip();
         self.solution.interpolated_within(&self.nodal_stress(), &x, &y, reach)
     }

@@ -22,7 +22,7 @@ pub enum ActionKind<T> {
 
 impl<T> Action<T> {
     /// Whether bonds are cut.
-    pub fn is_cut(&self) -> bool {
+    pub(crate) fn is_cut(&self) -> bool {
         matches!(self.what, ActionKind::Cut(_))
     }
 }

@@ -4,7 +4,7 @@
 pub type Block = [[f64; 2]; 2];
 
 /// The block that changes no vector.
-pub const IDENTITY: Block = [[1.0, 0.0], [0.0, 1.0]];
+pub(crate) const IDENTITY: Block = [[1.0, 0.0], [0.0, 1.0]];
 
 /// `block * vector`.
 pub fn apply(block: &Block, [x, y]: [f64; 2]) -> [f64; 2] {

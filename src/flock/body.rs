@@ -201,13 +201,13 @@ pub struct OutlineParticles {
 }
 
 /// More lattice sites than this are refused before memory is asked for, where they are to stand in one process.
-pub const MOST_SITES: u64 = 1 << 28;
+pub(crate) const MOST_SITES: u64 = 1 << 28;
 
 /// Columns and rows beyond this one are refused, or sums of two would leave the integers.
 const FARTHEST_SITE: u64 = 1_000_000_000;
 
 /// More neighbour entries than this are refused before memory is asked for: 4 GiB.
-pub const MOST_ENTRIES: u64 = 1 << 30;
+pub(crate) const MOST_ENTRIES: u64 = 1 << 30;
 
 impl Body {
     /// Column of the particles that stand along the outline and at no site: beyond all columns of the lattice.
@@ -347,7 +347,7 @@ impl Outlay<'_> {
 impl Body {
     /// Particles that lie on no lattice. Of one they keep the `spacing` \[length\]; their sites are a row, in
     /// their order.
-    pub fn of_places(places: Vectors, spacing: f64) -> Self {
+    pub(crate) fn of_places(places: Vectors, spacing: f64) -> Self {
         Self {
             lattice: Lattice::new(LatticeKind::Square { spacing }, [0.0; 2], 0.0),
             sites: (0..places.len() as i32).map(|i| [i, 0]).collect(),
@@ -366,7 +366,7 @@ impl Body {
     }
 
     /// The id of the particle with this index in the whole body.
-    pub fn id_of(&self, index: usize) -> usize {
+    pub(crate) fn id_of(&self, index: usize) -> usize {
         self.numbering.as_ref().map_or(index + 1, |numbering| numbering.id(index) as usize)
     }
 
@@ -379,7 +379,7 @@ impl Body {
     }
 
     /// The particle with this index in the whole body, if it is here as in that.
-    pub fn exact_particle(&self, index: usize) -> Option<usize> {
+    pub(crate) fn exact_particle(&self, index: usize) -> Option<usize> {
         index.checked_sub(self.first()).filter(|particle| self.exact().contains(particle))
     }
 
@@ -434,7 +434,7 @@ impl Body {
     }
 
     /// Indices of the particles that are no frame.
-    pub fn body_particles(&self) -> impl Iterator<Item = usize> + Clone + '_ {
+    pub(crate) fn body_particles(&self) -> impl Iterator<Item = usize> + Clone + '_ {
         (0..self.count()).filter(|&i| !self.is_frame[i])
     }
 
@@ -484,7 +484,7 @@ impl Body {
 }
 
 /// Grid columns that the widest of these cells is wide, at least; 0 of none.
-pub fn cell_width(cells: &[Vec<Site>]) -> i32 {
+pub(crate) fn cell_width(cells: &[Vec<Site>]) -> i32 {
     let columns = cells.iter().flatten().map(|corner| corner[0]);
     columns.clone().max().unwrap_or(0) - columns.min().unwrap_or(0)
 }

@@ -58,7 +58,7 @@ impl CellsAround {
 
     /// Adds a patch to the class at hand: its stiffness \[force / length^3\], and its cells: kind, share of area
     /// \[length^2\] and corners.
-    pub fn push_patch(&mut self, stiffness: f64, cells: impl Iterator<Item = (u32, f64, Vec<u32>)>) {
+    pub(crate) fn push_patch(&mut self, stiffness: f64, cells: impl Iterator<Item = (u32, f64, Vec<u32>)>) {
         let begin = self.patch_cells.len() as u32;
         for (element, share, slots) in cells {
             self.patch_cells.push(PatchPart { element, corners: self.slots.len() as u32, share });
@@ -68,20 +68,20 @@ impl CellsAround {
     }
 
     /// Ends the class at hand.
-    pub fn end_class(&mut self) {
+    pub(crate) fn end_class(&mut self) {
         self.starts.push(self.cells.len() as u32);
         self.patch_starts.push(self.patches.len() as u32);
     }
 
     /// Adds a class with the cells and patches of another.
-    pub fn copy_class(&mut self, class: usize) {
+    pub(crate) fn copy_class(&mut self, class: usize) {
         self.cells.extend_from_within(range(&self.starts, class));
         self.patches.extend_from_within(range(&self.patch_starts, class));
         self.end_class();
     }
 
     /// The patches that a particle of a class feels: stiffness \[force / length^3\] and cells.
-    pub fn patches_of(
+    pub(crate) fn patches_of(
         &self,
         class: usize,
     ) -> impl Iterator<Item = (f64, impl Iterator<Item = PatchCell<'_>> + Clone)> + Clone {

@@ -52,7 +52,7 @@ impl Body {
     ///
     /// # Errors
     /// A radius that holds too many, or none for some particle.
-    pub fn of_cloud(cloud: &Cloud, radius: Option<f64>) -> Result<(Self, Neighbours), BodyError> {
+    pub(crate) fn of_cloud(cloud: &Cloud, radius: Option<f64>) -> Result<(Self, Neighbours), BodyError> {
         let Cloud { points, ids, spacing } = cloud;
         let order = order_in_columns(points, *spacing);
         let places: Vectors = order.iter().map(|&row| points.get(row as usize)).collect();

@@ -24,7 +24,7 @@ pub enum Threshold {
 
 impl Threshold {
     /// Whether a bond of reference length `rest` breaks at `length` \[length\].
-    pub fn is_passed(self, length: f64, rest: f64) -> bool {
+    pub(crate) fn is_passed(self, length: f64, rest: f64) -> bool {
         length > self.limit(rest)
     }
 
@@ -108,7 +108,7 @@ impl Bonds {
     }
 
     /// All bonds of `neighbours`, of which none breaks by itself.
-    pub fn uncut(neighbours: &Neighbours) -> Self {
+    pub(crate) fn uncut(neighbours: &Neighbours) -> Self {
         Self::new(None, Ghosts::Lattice, neighbours)
     }
 
@@ -118,19 +118,19 @@ impl Bonds {
     }
 
     /// Whether any bond is broken.
-    pub fn any_broken(&self) -> bool {
+    pub(crate) fn any_broken(&self) -> bool {
         self.any_broken
     }
 
     /// Breaks the bonds that `is_broken` names and mends all others.
-    pub fn set_broken(&mut self, is_broken: impl Fn(usize) -> bool) {
+    pub(crate) fn set_broken(&mut self, is_broken: impl Fn(usize) -> bool) {
         self.broken.iter_mut().enumerate().for_each(|(bond, broken)| *broken = is_broken(bond));
         self.any_broken = self.broken.contains(&true);
         self.watch = None;
     }
 
     /// Whether a particle has lost a bond.
-    pub fn is_torn(&self, particle: usize, neighbours: &Neighbours) -> bool {
+    pub(crate) fn is_torn(&self, particle: usize, neighbours: &Neighbours) -> bool {
         self.any_broken && self.broken[neighbours.bonds(particle)].contains(&true)
     }
 
@@ -178,7 +178,7 @@ impl Bonds {
 
     /// Breaks, at this step, every bond that crosses the cut from `from` to `to` \[length\] where its ends are at present.
     /// Bonds to the frame hold: it is no matter.
-    pub fn cut_present(
+    pub(crate) fn cut_present(
         &mut self,
         step: usize,
         (from, to): Segment,
@@ -195,7 +195,7 @@ impl Bonds {
     }
 
     /// Breaks every bond to a particle that has become a ghost.
-    pub fn release_ghosts(
+    pub(crate) fn release_ghosts(
         &mut self,
         step: usize,
         neighbours: &Neighbours,
@@ -209,7 +209,7 @@ impl Bonds {
     }
 
     /// The end of a pair from which a broken bond is recorded: the lower one, if that sees the other.
-    pub fn recorded_from([low, high]: [usize; 2], neighbours: &Neighbours) -> usize {
+    pub(crate) fn recorded_from([low, high]: [usize; 2], neighbours: &Neighbours) -> usize {
         if bond_to(low, high, neighbours).is_some() { low } else { high }
     }
 

@@ -34,7 +34,7 @@ impl FrameRule {
     }
 
     /// Whether the displacements copied are those from before the sweep.
-    pub fn looks_before_the_sweep(self) -> bool {
+    pub(crate) fn looks_before_the_sweep(self) -> bool {
         self == FrameRule::Lagged
     }
 }
@@ -90,7 +90,7 @@ impl Frame {
     }
 
     /// Mean of a number that belongs to each particle which frame point number `k` serves.
-    pub fn mean_of_served<T: Real>(&self, k: usize, of: impl Fn(usize) -> T) -> T {
+    pub(crate) fn mean_of_served<T: Real>(&self, k: usize, of: impl Fn(usize) -> T) -> T {
         let served = self.served_by(k);
         let mut sum = T::default();
         served.iter().for_each(|&s| sum += of(s as usize));

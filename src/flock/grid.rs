@@ -108,7 +108,13 @@ impl CellGrid {
     /// Replaces the lists by those of every point within the radius of the last [`CellGrid::fill`] of
     /// each of `count` points, in order of index: what [`CellGrid::within`] finds, a cell at a time.
     /// A point that was not included has no neighbours.
-    pub fn all_within(&mut self, count: usize, radius: f64, starts: &mut Vec<u32>, index: &mut Vec<u32>) {
+    pub(crate) fn all_within(
+        &mut self,
+        count: usize,
+        radius: f64,
+        starts: &mut Vec<u32>,
+        index: &mut Vec<u32>,
+    ) {
         self.found.clear();
         self.found.resize(count, (0, 0));
         let total = self.look_around(radius);

@@ -11,9 +11,9 @@ pub trait InLanes {
 
 /// For [`in_lanes`]: one of AVX2's vectors at a time, for loops that wait for loads and stores. Measured: no slower than
 /// AVX-512 on the processors tried, and 1.4 times as fast as the oldest vectors in bodies within the caches.
-pub const MEMORY: bool = false;
+pub(crate) const MEMORY: bool = false;
 /// For [`in_lanes`]: two of the widest vectors at a time, for loops that multiply. Measured: up to twice as fast.
-pub const ARITHMETIC: bool = true;
+pub(crate) const ARITHMETIC: bool = true;
 
 /// The vectors that [`in_lanes`] takes on this processor, in words.
 pub fn vectors() -> &'static str {

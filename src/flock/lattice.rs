@@ -117,7 +117,7 @@ impl Lattice {
     }
 
     /// Whether the lattice has a site at these integers: the parity rule.
-    pub fn is_site(&self, [i, j]: Site) -> bool {
+    pub(crate) fn is_site(&self, [i, j]: Site) -> bool {
         match self.kind {
             LatticeKind::Square { .. } | LatticeKind::Rectangular { .. } | LatticeKind::Oblique { .. } => {
                 true
@@ -154,7 +154,7 @@ impl Lattice {
 
     /// The integer coordinates, as reals, of a point in the plane: the inverse of
     /// [`Lattice::position`].
-    pub fn grid_coordinates(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn grid_coordinates(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         // In units of the grid, or areas would leave the range of a double long before lengths do.
         let unit = norm(self.e1).max(norm(self.e2));
         let (dx, dy) = ((x - self.origin[0]) / unit, (y - self.origin[1]) / unit);
@@ -181,7 +181,7 @@ impl Lattice {
     }
 
     /// Area of the Voronoi cell of one particle \[length^2\].
-    pub fn cell_area(&self) -> f64 {
+    pub(crate) fn cell_area(&self) -> f64 {
         let grid_cell = (self.e1[0] * self.e2[1] - self.e1[1] * self.e2[0]).abs();
         match self.kind {
             LatticeKind::Square { .. } | LatticeKind::Rectangular { .. } | LatticeKind::Oblique { .. } => {
@@ -226,7 +226,7 @@ impl Lattice {
     }
 
     /// Sorts offsets in the neighbour order of [`Lattice::offsets_within`].
-    pub fn sort_nearest_first(&self, offsets: &mut [Site]) {
+    pub(crate) fn sort_nearest_first(&self, offsets: &mut [Site]) {
         let scale = norm(self.grid[0]).min(norm(self.grid[1]));
         // Rounded, so that distances and angles that differ by rounding alone tie.
         offsets.sort_by_key(|&[i, j]| {
@@ -237,7 +237,7 @@ impl Lattice {
     }
 
     /// First neighbours of a site of `sublattice`, in the documented order.
-    pub fn first_neighbours(&self, sublattice: usize) -> Vec<Site> {
+    pub(crate) fn first_neighbours(&self, sublattice: usize) -> Vec<Site> {
         let mut offsets: Vec<Site> = match self.kind {
             LatticeKind::Square { .. } | LatticeKind::Rectangular { .. } => {
                 vec![[1, 0], [-1, 0], [0, 1], [0, -1]]
@@ -255,7 +255,7 @@ impl Lattice {
     }
 
     /// Offsets that close a frame around a body: those sharing a lattice cell with the site.
-    pub fn cell_corners(&self) -> Vec<Site> {
+    pub(crate) fn cell_corners(&self) -> Vec<Site> {
         match self.kind {
             LatticeKind::Square { .. } | LatticeKind::Rectangular { .. } | LatticeKind::Oblique { .. } => {
                 ring(&self.primitive(), 1)
@@ -265,7 +265,7 @@ impl Lattice {
     }
 
     /// A site of the given sublattice, for walking its neighbourhood.
-    pub fn site_of_sublattice(&self, sublattice: usize) -> Site {
+    pub(crate) fn site_of_sublattice(&self, sublattice: usize) -> Site {
         match self.kind {
             LatticeKind::Honeycomb { .. } if sublattice == 1 => [2, 0],
             _ => [0, 0],

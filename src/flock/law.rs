@@ -76,7 +76,7 @@ impl MatrixWeights {
     }
 
     /// Stiffnesses of a particle, parallel to its neighbours.
-    pub fn stiffness_of(&self, particle: usize) -> &[Block] {
+    pub(crate) fn stiffness_of(&self, particle: usize) -> &[Block] {
         &self.stiffness[self.range(particle)]
     }
 
@@ -87,7 +87,7 @@ impl MatrixWeights {
     }
 
     /// The patches that a particle feels, whose dilatations are averaged: stiffness \[force / length^3\] and cells.
-    pub fn patches_around(
+    pub(crate) fn patches_around(
         &self,
         particle: usize,
     ) -> impl Iterator<Item = (f64, impl Iterator<Item = PatchCell<'_>> + Clone)> + Clone {
@@ -174,7 +174,7 @@ impl Flock {
 
     /// Target position by another rule over the same neighbours and weights.
     #[inline]
-    pub fn target_by(&self, rule: &Rule, particle: usize, present: &Vectors) -> [f64; 2] {
+    pub(crate) fn target_by(&self, rule: &Rule, particle: usize, present: &Vectors) -> [f64; 2] {
         let own = ParticleState {
             present: present.get(particle),
             reference: self.reference.get(particle),
@@ -331,7 +331,7 @@ impl Flock {
 
     /// Computes anew the rest offsets of particles whose bonds have broken or been mended, where no ghosts stand in for
     /// lost neighbours: each then rests on the neighbours that are left. One without any has no mean and stays anyway.
-    pub fn renew_rest(&mut self, particles: impl IntoIterator<Item = usize>) {
+    pub(crate) fn renew_rest(&mut self, particles: impl IntoIterator<Item = usize>) {
         let has_ghosts = self.bonds.as_ref().is_none_or(|bonds| bonds.ghosts != Ghosts::None);
         if !self.keeps_rest || has_ghosts || matches!(self.rule.mean, Mean::Material { .. }) {
             return;
@@ -352,7 +352,7 @@ impl Flock {
     }
 
     /// The same of all particles that have lost a bond.
-    pub fn renew_rest_of_torn(&mut self) {
+    pub(crate) fn renew_rest_of_torn(&mut self) {
         let Some(bonds) = self.bonds.as_ref().filter(|bonds| bonds.any_broken()) else { return };
         let is_torn = |&j: &usize| bonds.is_torn(j, &self.neighbours);
         let torn: Vec<usize> = (0..self.reference.len()).filter(is_torn).collect();
@@ -364,7 +364,7 @@ impl Flock {
     }
 
     /// Indices of the neighbours that are not lost to `particle`.
-    pub fn live_neighbours(&self, particle: usize) -> impl Iterator<Item = usize> + '_ {
+    pub(crate) fn live_neighbours(&self, particle: usize) -> impl Iterator<Item = usize> + '_ {
         self.neighbours
             .bonds(particle)
             .filter(|&bond| !self.is_lost(bond))

@@ -220,7 +220,13 @@ impl Neighbours {
 
     /// Rebuilds the lists as those of the `members` within `radius` now, in order of index.
     /// Reuses the buffers: no allocation once they have grown.
-    pub fn rebuild_within(&mut self, grid: &mut CellGrid, present: &Vectors, members: &[bool], radius: f64) {
+    pub(crate) fn rebuild_within(
+        &mut self,
+        grid: &mut CellGrid,
+        present: &Vectors,
+        members: &[bool],
+        radius: f64,
+    ) {
         grid.fill(present, members, radius);
         grid.all_within(members.len(), radius, &mut self.starts, &mut self.index);
     }

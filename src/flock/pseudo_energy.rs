@@ -9,7 +9,7 @@ pub fn pe1(flock: &Flock, particle: usize, present: &Vectors) -> f64 {
 }
 
 /// The same over these neighbours, as those that were bonded at an earlier step.
-pub fn pe1_among(
+pub(crate) fn pe1_among(
     flock: &Flock,
     particle: usize,
     neighbours: impl Iterator<Item = usize>,

@@ -32,7 +32,7 @@ pub fn strain(flock: &Flock, particle: usize, present: &Vectors) -> Option<Strai
 }
 
 /// The same over these neighbours, as those that were bonded at an earlier step.
-pub fn strain_among(
+pub(crate) fn strain_among(
     flock: &Flock,
     particle: usize,
     neighbours: impl Iterator<Item = usize>,

@@ -45,7 +45,7 @@ impl<T: Copy + Default> Vectors<T> {
     }
 
     /// The same, to be overwritten.
-    pub fn components_mut(&mut self) -> [&mut [T]; 2] {
+    pub(crate) fn components_mut(&mut self) -> [&mut [T]; 2] {
         [&mut self.x, &mut self.y]
     }
 

@@ -73,7 +73,7 @@ impl BoxTree {
 
     /// Numbers of the boxes that overlap or touch the one between two corners, and perhaps of some that miss it by a
     /// rounding error; in no particular order.
-    pub fn overlapping(&self, low: Point, high: Point) -> impl Iterator<Item = usize> + Clone + '_ {
+    pub(crate) fn overlapping(&self, low: Point, high: Point) -> impl Iterator<Item = usize> + Clone + '_ {
         let is_apart = move |l: &Point, h: &Point| (0..2).any(|k| l[k] > high[k] || h[k] < low[k]);
         let mut at = 0;
         let leaves = std::iter::from_fn(move || {

@@ -217,7 +217,7 @@ impl<'a> Finder<'a> {
 }
 
 /// A tree of the boxes around pieces.
-pub fn tree_of<'a>(pieces: impl Iterator<Item = &'a Piece>) -> BoxTree {
+pub(crate) fn tree_of<'a>(pieces: impl Iterator<Item = &'a Piece>) -> BoxTree {
     BoxTree::new(pieces.map(|piece| {
         let (low, high) = piece.bounds();
         // A flat arc is known to no better than a part of its radius.

@@ -88,7 +88,7 @@ pub enum OutlineError {
 }
 
 /// How messages name a loop.
-pub fn ring_name(ring: usize) -> String {
+pub(crate) fn ring_name(ring: usize) -> String {
     if ring == 0 { "the outer outline".into() } else { format!("the outline of hole {ring}") }
 }
 
@@ -190,7 +190,11 @@ impl Outline {
     }
 
     /// The same among pieces given by the numbers of their loop and their own.
-    pub fn nearest_among(&self, p: Point, pieces: impl Iterator<Item = [usize; 2]>) -> Option<(Place, f64)> {
+    pub(crate) fn nearest_among(
+        &self,
+        p: Point,
+        pieces: impl Iterator<Item = [usize; 2]>,
+    ) -> Option<(Place, f64)> {
         let place = |[ring, number]: [usize; 2]| {
             let piece = self.piece(ring, number);
             let t = piece.nearest(p);

@@ -111,13 +111,13 @@ impl Partition {
     }
 
     /// Whether a loop bounds the body, and is no line inside.
-    pub fn is_bounding(&self, ring: usize) -> bool {
+    pub(crate) fn is_bounding(&self, ring: usize) -> bool {
         ring < self.outline.rings().len()
     }
 
     /// Whether a loop or line comes back to where it begins: every loop of the outline does, and a region's outline
     /// that lies wholly inside the body.
-    pub fn is_closed(&self, ring: usize) -> bool {
+    pub(crate) fn is_closed(&self, ring: usize) -> bool {
         self.is_bounding(ring) || self.closed[ring - self.outline.rings().len()]
     }
 
@@ -143,14 +143,14 @@ impl Partition {
     }
 
     /// The region whose outline a line inside is part of, counted from 1: of several that share it the first.
-    pub fn region_along(&self, line: usize) -> usize {
+    pub(crate) fn region_along(&self, line: usize) -> usize {
         let p = self.piece(line, 0).point(0.5);
         let is_along = |region: &Outline| region.nearest(p).1 <= 1e3 * self.near();
         self.regions.iter().position(is_along).map_or(0, |k| k + 1)
     }
 
     /// Whether a line ends at a corner.
-    pub fn is_junction(&self, corner: [usize; 2]) -> bool {
+    pub(crate) fn is_junction(&self, corner: [usize; 2]) -> bool {
         self.junctions.contains(&corner)
     }
 

@@ -54,7 +54,7 @@ impl Piece {
 
     /// The arc from one point to another about `centre` \[length\], which is as far from both; the whole circle if they
     /// are one.
-    pub fn arc_between(from: Point, to: Point, centre: Point, clockwise: bool) -> Self {
+    pub(crate) fn arc_between(from: Point, to: Point, centre: Point, clockwise: bool) -> Self {
         let [start, end] = [from, to].map(|p| (p[1] - centre[1]).atan2(p[0] - centre[0]));
         let left = if from == to { TAU } else { (end - start).rem_euclid(TAU) };
         let sweep = if clockwise && from != to {
@@ -196,7 +196,7 @@ pub(super) fn reversed(ring: &[Piece]) -> Vec<Piece> {
 }
 
 /// Whether closed loops of pieces go around `p` an odd number of times.
-pub fn is_inside<'a>(pieces: impl Iterator<Item = &'a Piece>, p: Point) -> bool {
+pub(crate) fn is_inside<'a>(pieces: impl Iterator<Item = &'a Piece>, p: Point) -> bool {
     let changes = |piece: &Piece| u8::from(crosses_ray(piece, p)) + u8::from(is_in_segment(piece, p));
     pieces.map(changes).fold(0, |sum: u8, next| sum ^ (next & 1)) == 1
 }

@@ -130,7 +130,7 @@ pub(super) fn path_contains<'a>(
 }
 
 /// Distance of a point from the segment between two others \[length\].
-pub fn segment_distance(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
+pub(crate) fn segment_distance(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
     let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
     let length = dx.hypot(dy);
     // Along the segment from 0 at `a` to 1 at `b`; a segment of no length is its point.
@@ -143,7 +143,7 @@ pub fn segment_distance(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
 }
 
 /// Whether the segments `a`-`b` and `c`-`d` cross or touch.
-pub fn segments_cross(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2]) -> bool {
+pub(crate) fn segments_cross(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2]) -> bool {
     let apart = |p: [f64; 2], q: [f64; 2]| [q[0] - p[0], q[1] - p[1]];
     // In units of the largest distance, and by sign: their products would be fourth powers of lengths.
     let unit = [b, c, d].iter().flat_map(|&end| apart(a, end)).fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()));

@@ -28,13 +28,13 @@ pub struct Specimen {
 impl Specimen {
     /// ASTM E8/E8M sheet-type, 12.5 mm wide: overall 200, reduced section 57, grip width 20, fillet
     /// radius 12.5 (Fig. 1 of the standard), times `scale`.
-    pub fn e8_sheet(scale: f64) -> Self {
+    pub(crate) fn e8_sheet(scale: f64) -> Self {
         Self::scaled([200.0, 20.0, 12.5, 57.0, 12.5], scale)
     }
 
     /// ASTM D638 Type I: overall 165, narrow section 57 long and 13 wide, grip width 19, fillet
     /// radius 76 (Fig. 1 of the standard), times `scale`.
-    pub fn d638_type_i(scale: f64) -> Self {
+    pub(crate) fn d638_type_i(scale: f64) -> Self {
         Self::scaled([165.0, 19.0, 13.0, 57.0, 76.0], scale)
     }
 

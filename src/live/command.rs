@@ -6,7 +6,7 @@ use crate::scene::raw::RawSide;
 use crate::swarm::design::Edit;
 
 /// Longest request of a viewer \[byte\].
-pub const MOST_BYTES: usize = 4096;
+pub(crate) const MOST_BYTES: usize = 4096;
 
 /// Something that a viewer asks for.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

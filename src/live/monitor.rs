@@ -109,7 +109,7 @@ impl Monitor {
     }
 
     /// Whether viewers may send commands.
-    pub fn takes_commands(&self) -> bool {
+    pub(crate) fn takes_commands(&self) -> bool {
         self.commands.is_some()
     }
 

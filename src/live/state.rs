@@ -72,7 +72,7 @@ impl Board {
     }
 
     /// Gives later viewers this page.
-    pub fn set_page(&self, page: String) {
+    pub(crate) fn set_page(&self, page: String) {
         self.inner().page = page.into();
     }
 
@@ -112,7 +112,7 @@ impl Board {
     }
 
     /// Whether a viewer looks at this quantity.
-    pub fn is_wanted(&self, quantity: &str) -> bool {
+    pub(crate) fn is_wanted(&self, quantity: &str) -> bool {
         self.inner().wanted.values().any(|wanted| wanted == quantity)
     }
 
@@ -135,7 +135,7 @@ impl Board {
     }
 
     /// Whether the session is over.
-    pub fn is_closed(&self) -> bool {
+    pub(crate) fn is_closed(&self) -> bool {
         self.inner().is_closed
     }
 

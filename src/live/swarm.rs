@@ -23,7 +23,7 @@ use crate::swarm::flight::{Alarm, Flight, FlightCommand};
 use crate::swarm::plan::Exactness;
 
 /// Quantities that come with every frame: a swarm is small.
-pub const CHANNELS: [&str; 9] =
+pub(crate) const CHANNELS: [&str; 9] =
     ["clearance", "away", "age", "pe1", "strain", "target_dx", "target_dy", "speed", "acceleration"];
 
 /// Keys of the flight that may change while robots fly: noise, delay and loss.

@@ -120,7 +120,7 @@ impl Default for TwistWithCovariance {
 
 impl Quaternion {
     /// The rotation about z by `yaw` \[rad\], counter-clockwise seen from above.
-    pub fn from_yaw(yaw: f64) -> Self {
+    pub(crate) fn from_yaw(yaw: f64) -> Self {
         let (z, w) = (yaw / 2.0).sin_cos();
         Self { x: 0.0, y: 0.0, z, w }
     }

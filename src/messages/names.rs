@@ -6,9 +6,9 @@
 use super::remap::{RemapRule, Scope};
 
 /// Longest fully qualified topic or service name \[characters\]: 255 less the `rt/`-like prefix and suffix.
-pub const LONGEST_NAME: usize = 247;
+pub(crate) const LONGEST_NAME: usize = 247;
 /// Longest node name \[characters\].
-pub const LONGEST_NODE_NAME: usize = 255;
+pub(crate) const LONGEST_NODE_NAME: usize = 255;
 
 /// A name that ROS 2 does not allow.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -179,7 +179,7 @@ fn error(what: &'static str, name: &str, reason: String, help: &'static str) -> 
 ///
 /// # Errors
 /// A name that is empty, too long or not one token.
-pub fn check_node_name(name: &str) -> Result<(), NameError> {
+pub(crate) fn check_node_name(name: &str) -> Result<(), NameError> {
     let refuse = |reason, help| error("node name", name, reason, help);
     if name.len() > LONGEST_NODE_NAME {
         let reason = format!("has {} characters, more than {LONGEST_NODE_NAME}", name.len());
@@ -195,7 +195,7 @@ pub fn check_node_name(name: &str) -> Result<(), NameError> {
 ///
 /// # Errors
 /// A namespace that is relative, too long, or has a token that is not allowed.
-pub fn check_namespace(namespace: &str) -> Result<(), NameError> {
+pub(crate) fn check_namespace(namespace: &str) -> Result<(), NameError> {
     if namespace == "/" { Ok(()) } else { check_full_name("namespace", namespace) }
 }
 
@@ -224,7 +224,7 @@ fn check_full_name(what: &'static str, name: &str) -> Result<(), NameError> {
 ///
 /// # Errors
 /// A description of the fault.
-pub fn check_token(token: &str) -> Result<(), String> {
+pub(crate) fn check_token(token: &str) -> Result<(), String> {
     let is_allowed = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
     if token.is_empty() {
         return Err("is empty".into());

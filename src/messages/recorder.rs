@@ -9,7 +9,7 @@ use crate::messages::wire::encode;
 use crate::swarm::control::Control;
 
 /// Topic of [`LoopEvent`]s, below the node's name.
-pub const EVENTS: &str = "~/events";
+pub(crate) const EVENTS: &str = "~/events";
 
 /// Encapsulation header of plain CDR in little endian.
 const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];

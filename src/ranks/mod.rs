@@ -99,7 +99,7 @@ impl Team {
     }
 
     /// The words of all ranks, one after the other, where each has as many as it has; an exchange less where there are none.
-    pub fn gather_all(&self, own: &[u64]) -> Vec<u64> {
+    pub(crate) fn gather_all(&self, own: &[u64]) -> Vec<u64> {
         let counts: Vec<usize> =
             self.each([own.len() as u64]).into_iter().map(|[count]| count as usize).collect();
         if counts.iter().all(|&count| count == 0) { Vec::new() } else { self.gather(own, &counts) }
@@ -155,7 +155,7 @@ impl Team {
     }
 
     /// The bytes of each rank, shape \[ranks\].
-    pub fn each_bytes(&self, own: &[u8]) -> Vec<Vec<u8>> {
+    pub(crate) fn each_bytes(&self, own: &[u8]) -> Vec<Vec<u8>> {
         let lengths: Vec<usize> =
             self.each([own.len() as u64]).into_iter().map(|[length]| length as usize).collect();
         let counts: Vec<usize> = lengths.iter().map(|length| length.div_ceil(8)).collect();
@@ -179,12 +179,6 @@ impl Team {
     pub fn receive_bytes(&self, from: usize) -> Vec<u8> {
         let length = self.swap(&[], &[(from, 1)])[0][0] as usize;
         unpacked(&self.swap(&[], &[(from, length.div_ceil(8))])[0], length)
-    }
-
-    /// The first rank whose words differ from the first rank's.
-    pub fn first_unlike<const N: usize>(&self, own: [u64; N]) -> Option<usize> {
-        let all = self.each(own);
-        all.iter().position(|one| Some(one) != all.first())
     }
 
     fn exchange(&self) -> MutexGuard<'_, dyn Exchange + 'static> {

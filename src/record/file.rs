@@ -16,7 +16,7 @@ use crate::messages::definitions;
 use crate::messages::recorder::RecordedMessage;
 
 /// Name of the metadata record that says what was recorded.
-pub const METADATA: &str = "flockform";
+pub(crate) const METADATA: &str = "flockform";
 /// Name of the attachment that is the swarm file.
 pub const SWARM: &str = "swarm.toml";
 /// Bytes before compression that are written at once: what a killed program loses.

@@ -104,12 +104,12 @@ impl Scene {
     }
 
     /// Which role entry, if any, first leads particles to where finite elements have them.
-    pub fn led_by_reference(&self) -> Option<usize> {
+    pub(crate) fn led_by_reference(&self) -> Option<usize> {
         self.roles.iter().position(|entry| matches!(entry.motion, Some(LeaderMotion::Reference { .. })))
     }
 
     /// Which of the materials of the body sees farthest.
-    pub fn farthest_seeing(&self) -> Option<&Elastic> {
+    pub(crate) fn farthest_seeing(&self) -> Option<&Elastic> {
         farthest_seeing(self.material.as_ref(), &self.inclusions)
     }
 
@@ -122,7 +122,7 @@ impl Scene {
     }
 
     /// Whether the body was given as points instead of cut from a lattice.
-    pub fn is_of_points(&self) -> bool {
+    pub(crate) fn is_of_points(&self) -> bool {
         matches!(self.body, BodySource::Points(_))
     }
 

@@ -68,7 +68,7 @@ struct Opened<T: Payload> {
 }
 
 /// `flockform/SPACE/LEAF`.
-pub fn service_name(space: &str, leaf: &str) -> Result<String, ShmError> {
+pub(crate) fn service_name(space: &str, leaf: &str) -> Result<String, ShmError> {
     let refused = |reason| ShmError::Name { name: space.to_owned(), reason };
     if !(1..=64).contains(&space.len()) {
         return Err(refused("its length"));
@@ -292,7 +292,7 @@ impl<T: Payload> Writer<T> {
     ///
     /// # Errors
     /// As [`Writer::send`].
-    pub fn hand_over(&mut self, filled: Filled<T>, stamp: f64, step: u64) -> Result<(), ShmError> {
+    pub(crate) fn hand_over(&mut self, filled: Filled<T>, stamp: f64, step: u64) -> Result<(), ShmError> {
         let Filled(mut slice) = filled;
         *slice.user_header_mut() = Header { sequence: self.sequence, step, stamp };
         slice.send().map_err(|error| self.refused(error))?;
@@ -424,7 +424,7 @@ impl<T: Payload> Reader<T> {
 }
 
 /// Slices taken in one call at most: a flood must not hold a loop.
-pub const MOST_AT_ONCE: usize = 1024;
+pub(crate) const MOST_AT_ONCE: usize = 1024;
 
 /// A slice in shared memory, as its writer filled it. Its place is free again when it is dropped.
 #[derive(Debug)]

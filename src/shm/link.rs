@@ -14,9 +14,9 @@ pub const POSES: &str = "poses";
 /// Leaf of the service that carries ranges to the loop, of swarms that have them.
 pub const RANGES: &str = "ranges";
 /// Leaf of the service that carries the places of leaders moved from outside to the loop.
-pub const LEADERS: &str = "leaders";
+pub(crate) const LEADERS: &str = "leaders";
 /// Leaf of the service that carries targets to the robots.
-pub const TARGETS: &str = "targets";
+pub(crate) const TARGETS: &str = "targets";
 
 /// The loop's end.
 pub struct Controller {
@@ -57,7 +57,7 @@ impl Controller {
     }
 
     /// The bell that rings when poses or places of leaders arrive.
-    pub fn bells(&self) -> Vec<Bell> {
+    pub(crate) fn bells(&self) -> Vec<Bell> {
         let ranges = self.ranges.iter().map(Reader::bell);
         [self.poses.bell(), self.leaders.bell()].into_iter().chain(ranges).collect()
     }

@@ -195,7 +195,7 @@ impl Member {
     }
 
     /// A name as it lies in memory.
-    pub fn name_of(name: &str) -> [u8; 64] {
+    pub(crate) fn name_of(name: &str) -> [u8; 64] {
         let mut bytes = [0; 64];
         let cut = (0..=name.len().min(64)).rev().find(|&at| name.is_char_boundary(at)).unwrap_or(0);
         bytes[..cut].copy_from_slice(&name.as_bytes()[..cut]);

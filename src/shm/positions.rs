@@ -9,7 +9,7 @@ use crate::engine::Engine;
 use crate::swarm::pace::system_time;
 
 /// Leaf of the service that carries the positions of a body.
-pub const POSITIONS: &str = "positions";
+pub(crate) const POSITIONS: &str = "positions";
 
 /// Steps between two looks for readers that died.
 const CLEANING: usize = 1000;

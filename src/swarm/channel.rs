@@ -114,7 +114,7 @@ impl Channel {
     }
 
     /// Sends as these say from the next pose on.
-    pub fn set_params(&mut self, params: ChannelParams) {
+    pub(crate) fn set_params(&mut self, params: ChannelParams) {
         self.params = params;
     }
 
@@ -124,7 +124,7 @@ impl Channel {
     }
 
     /// From the next pose on.
-    pub fn set_sender(&mut self, sender: Sender) {
+    pub(crate) fn set_sender(&mut self, sender: Sender) {
         if sender != self.sender {
             self.lying_since = None;
         }

@@ -54,7 +54,7 @@ impl fmt::Display for Caches {
 }
 
 /// Bytes of one core's second cache, where the system says.
-pub fn second_cache() -> Option<usize> {
+pub(crate) fn second_cache() -> Option<usize> {
     let caches = std::fs::read_dir("/sys/devices/system/cpu/cpu0/cache").ok()?;
     let of = |cache: std::fs::DirEntry| {
         let says = |what: &str| std::fs::read_to_string(cache.path().join(what)).ok();

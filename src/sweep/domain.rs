@@ -77,7 +77,7 @@ pub struct Needs {
 }
 
 /// Words of [`Needs::words`].
-pub const NEED_WORDS: usize = 3 + 2 * (MOST_STEPS + 1);
+pub(crate) const NEED_WORDS: usize = 3 + 2 * (MOST_STEPS + 1);
 
 impl Needs {
     fn of(owned: Range<usize>, all: Range<usize>) -> Self {
@@ -102,7 +102,7 @@ impl Needs {
     }
 
     /// Of another rank.
-    pub fn of_words(words: &[u64; NEED_WORDS]) -> Self {
+    pub(crate) fn of_words(words: &[u64; NEED_WORDS]) -> Self {
         let range = |ends: &[u64]| ends[0] as usize..ends[1] as usize;
         let needed = words[3..].chunks_exact(2).map(range).collect();
         Self { owned: range(&words[..2]), steps: words[2] as usize, needed }
@@ -121,7 +121,7 @@ pub struct Halo {
 
 impl Domain {
     /// Parts with about as many followers each; or the part that is there.
-    pub fn of_rows(rows: &Rows, share: Share) -> Self {
+    pub(crate) fn of_rows(rows: &Rows, share: Share) -> Self {
         if let Some(held) = share.part {
             return Self::of_held_rows(rows, share, held);
         }
@@ -170,7 +170,7 @@ impl Domain {
     }
 
     /// The same where the rule has no rows.
-    pub fn of_particles(follows: &[bool], share: Share) -> Self {
+    pub(crate) fn of_particles(follows: &[bool], share: Share) -> Self {
         if let Some(held) = share.part {
             return Self::of_held(share, held);
         }
@@ -226,7 +226,7 @@ impl Domain {
     }
 
     /// Most steps that are worth taking together: more for larger parts, the same for all ranks.
-    pub fn steps_together(&self) -> usize {
+    pub(crate) fn steps_together(&self) -> usize {
         self.shares.iter().map(|share| share.steps).min().unwrap_or(0)
     }
 
@@ -244,7 +244,7 @@ impl Domain {
     }
 
     /// How many particles each rank receives before so many steps, shape \[ranks\].
-    pub fn halo_sizes(&self, steps: usize) -> Vec<usize> {
+    pub(crate) fn halo_sizes(&self, steps: usize) -> Vec<usize> {
         let of = |share: &Needs| share.needed[steps].len().saturating_sub(share.owned.len());
         self.shares.iter().map(of).collect()
     }

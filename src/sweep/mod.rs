@@ -106,7 +106,7 @@ impl Sweep {
     }
 
     /// The same for one of the ranks that share the body.
-    pub fn compile_share(update: Update, flock: &Flock, roles: &[Role], share: Share) -> Self {
+    pub(crate) fn compile_share(update: Update, flock: &Flock, roles: &[Role], share: Share) -> Self {
         let mut sweep = Self::uncompiled(update, flock, roles);
         if update.order == Order::Synchronous {
             sweep.rows = Rows::compile(flock, &sweep.follows, share);
@@ -140,7 +140,7 @@ impl Sweep {
 
     /// Leaves to the other ranks what is theirs; to be called before anything is swept. A sequential sweep cannot be
     /// shared: each particle waits for the one before it.
-    pub fn share_with(&mut self, share: Share) {
+    pub(crate) fn share_with(&mut self, share: Share) {
         if let Some(Held { owned: [start, end], .. }) = share.part {
             self.followers = self.follows[start..end].iter().filter(|&&follows| follows).count();
         }
@@ -156,7 +156,7 @@ impl Sweep {
     }
 
     /// The same, for what is to be learned of the other ranks.
-    pub fn domain_mut(&mut self) -> Option<&mut Domain> {
+    pub(crate) fn domain_mut(&mut self) -> Option<&mut Domain> {
         self.domain.as_mut()
     }
 
@@ -166,12 +166,12 @@ impl Sweep {
     }
 
     /// How many particles each rank receives before so many steps, shape \[ranks\]; nothing where the body is not shared.
-    pub fn halo_sizes(&self, steps: usize) -> Vec<usize> {
+    pub(crate) fn halo_sizes(&self, steps: usize) -> Vec<usize> {
         self.domain.as_ref().map_or_else(Vec::new, |domain| domain.halo_sizes(steps))
     }
 
     /// Most steps that are worth taking together.
-    pub fn steps_together(&self) -> usize {
+    pub(crate) fn steps_together(&self) -> usize {
         self.domain.as_ref().map_or(MOST_STEPS, Domain::steps_together)
     }
 

@@ -298,33 +298,33 @@ impl Rows {
         self.runs.push(Run { start, len, distances, neighbours: size, coefficients, kept, gaps: 0, rests });
     }
 
-    pub fn band_count(&self) -> usize {
+    pub(crate) fn band_count(&self) -> usize {
         self.bands.len().saturating_sub(1)
     }
 
     /// Whether particles so many places apart are in one band or in bands beside each other, wherever they are.
-    pub fn are_near(&self, apart: usize) -> bool {
+    pub(crate) fn are_near(&self, apart: usize) -> bool {
         let inner = 1..self.band_count().saturating_sub(1);
         !self.is_local || inner.into_iter().all(|band| self.particles(band..band + 1).len() >= apart)
     }
 
     /// Whether no particle sees farther than into the bands beside its own.
-    pub fn is_local(&self) -> bool {
+    pub(crate) fn is_local(&self) -> bool {
         self.is_local
     }
 
     /// Whether the caches hold the whole body.
-    pub fn is_in_cache(&self) -> bool {
+    pub(crate) fn is_in_cache(&self) -> bool {
         self.is_in_cache
     }
 
     /// Fewest particles in a band, but for the last.
-    pub fn band_size(&self) -> usize {
+    pub(crate) fn band_size(&self) -> usize {
         self.band_size
     }
 
     /// Whether the second cache holds the bands that take several steps together.
-    pub fn front_stays(&self) -> bool {
+    pub(crate) fn front_stays(&self) -> bool {
         self.is_in_cache || Caches::here().band.is_some_and(|most| self.band_size <= most)
     }
 
@@ -336,11 +336,6 @@ impl Rows {
     /// How many particles of a band follow.
     pub fn followers(&self, band: usize) -> usize {
         self.bands[band].followers as usize
-    }
-
-    /// How many particles follow in all.
-    pub fn all_followers(&self) -> usize {
-        self.followers
     }
 
     /// Share of the following particles that need no neighbour list.

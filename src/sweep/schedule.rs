@@ -86,18 +86,18 @@ impl Activity {
     }
 
     /// Takes the counts out, to be added up with those of other ranks: computed and due.
-    pub fn take_counts(&mut self) -> [u64; 2] {
+    pub(crate) fn take_counts(&mut self) -> [u64; 2] {
         [std::mem::take(&mut self.computed), std::mem::take(&mut self.due)]
     }
 
     /// Adds counts of other steps, or of other parts of the body.
-    pub fn add_counts(&mut self, [computed, due]: [u64; 2]) {
+    pub(crate) fn add_counts(&mut self, [computed, due]: [u64; 2]) {
         self.computed = self.computed.saturating_add(computed);
         self.due = self.due.saturating_add(due);
     }
 
     /// Counts steps of a whole body of so many followers.
-    pub fn count_whole(&mut self, followers: usize) {
+    pub(crate) fn count_whole(&mut self, followers: usize) {
         self.add_counts([2 * followers as u64; 2]);
     }
 }

@@ -170,15 +170,15 @@ impl<T: Real> Terms<'_, T> {
     }
 
     /// The axis whose targets the other's are made with, which must be nothing but means then.
-    pub fn couples_along(&self) -> Option<usize> {
+    pub(crate) fn couples_along(&self) -> Option<usize> {
         self.poisson.map(|poisson| poisson.along)
     }
 
-    pub fn is_fed(&self) -> bool {
+    pub(crate) fn is_fed(&self) -> bool {
         self.feedback.is_some()
     }
 
-    pub fn is_damped(&self) -> bool {
+    pub(crate) fn is_damped(&self) -> bool {
         self.damping.is_some()
     }
 
@@ -190,7 +190,7 @@ impl<T: Real> Terms<'_, T> {
     /// Adds the Poisson term to the means of the particles from number `from` on, across its axis; `along` are the means
     /// along it.
     #[inline(always)]
-    pub fn contract(&self, from: usize, along: &[T], target: &mut [T]) {
+    pub(crate) fn contract(&self, from: usize, along: &[T], target: &mut [T]) {
         if self.poisson.is_some() {
             self.contraction(from, &along[..target.len()]).all(target);
         }

@@ -15,19 +15,20 @@ use crate::cli::checkpoint::Checkpointer;
 use crate::cli::progress::Progress;
 
 /// Records, publications, progress, checkpoints, and the interrupt that ends them.
-pub struct RunObserver<'a, 'f> {
+pub struct RunObserver<'a> {
     pub recorder: Recorder<'a>,
     /// Positions shown to other processes.
     pub shown: Option<Positions>,
     pub messages: Option<BodyMessages>,
     pub progress: Progress,
     pub checkpointer: Checkpointer<'a>,
-    pub folder: &'f mut OutputFolder,
+    /// Of the rank that writes.
+    pub folder: Option<OutputFolder>,
     pub looks: Looks,
     pub interrupted: &'static AtomicBool,
 }
 
-impl Observer for RunObserver<'_, '_> {
+impl Observer for RunObserver<'_> {
     fn next(&mut self, step: usize) -> usize {
         self.looks.next(step).min(self.recorder.next(step))
     }
@@ -41,10 +42,19 @@ impl Observer for RunObserver<'_, '_> {
             messages.step(engine, residual);
         }
         self.progress.step(engine.step(), residual);
-        if self.checkpointer.is_due(engine.step()) && !self.recorder.failed() {
-            self.checkpointer.keep(self.folder, (engine, residual), self.recorder.kept());
+        if self.is_checkpoint_due(engine) && !engine.any_of_parts(self.recorder.failed()) {
+            let kept = self.recorder.kept(engine);
+            self.checkpointer.keep(self.folder.as_mut(), (engine, residual), kept);
         }
         let stop = self.recorder.failed() || self.interrupted.load(Ordering::Relaxed);
         if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
+
+impl RunObserver<'_> {
+    /// By the first rank's clock.
+    fn is_checkpoint_due(&self, engine: &Engine) -> bool {
+        let own = self.checkpointer.is_due(engine.step());
+        engine.parted().map_or(own, |team| team.of_first([u64::from(own)]) == [1])
     }
 }

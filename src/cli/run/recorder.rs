@@ -1,4 +1,5 @@
-//! The records of a run: snapshots, probes, measurements, frames, and what its report shows.
+//! The records of a run: snapshots, probes, measurements, frames, and what its report shows. Where each rank has a part of the
+//! body they are of tables and frames alone, and the first rank has the probes of all.
 
 use std::time::{Duration, Instant};
 
@@ -9,7 +10,7 @@ use flockform::engine::Engine;
 use flockform::export::memory::Outputs;
 use flockform::export::report::view::View;
 use flockform::export::report::{AnimationState, RunRecorder};
-use flockform::export::{ExportError, OutputFolder, VtkSeries};
+use flockform::export::{ExportError, OutputFolder, VtkSeries, probes_of_parts, write_piece};
 use flockform::scene::{LoadSteps, Scene};
 
 use crate::cli::checkpoint::{Recorded, ResumedRun};
@@ -19,7 +20,10 @@ pub struct Recorder<'a> {
     scene: &'a Scene,
     snapshots: Vec<Snapshot>,
     probes: Vec<ProbeSeries>,
+    /// Indices of the probed particles in the whole body.
+    probed: Vec<usize>,
     load_steps: Vec<LoadStep>,
+    /// Of the rank that writes.
     frames: Option<VtkSeries>,
     outputs: Outputs,
     /// Whether there shall be a film.
@@ -48,25 +52,25 @@ impl<'a> Recorder<'a> {
     pub fn new(
         scene: &'a Scene,
         plan: &Plan,
-        folder: &OutputFolder,
+        folder: Option<&OutputFolder>,
         left: Option<&ResumedRun>,
         (outputs, films): (Outputs, bool),
     ) -> Result<Self, ExportError> {
         // A body that is not stepped has no history.
         let is_solved_at_once = scene.is_solved_at_once();
-        let probed: &[usize] = if is_solved_at_once { &[] } else { &plan.probes };
+        let probed = if is_solved_at_once { Vec::new() } else { plan.probes.clone() };
         let new_probes = || probed.iter().map(|&particle| ProbeSeries::new(particle)).collect();
         let every = scene.record.vtk_every;
-        let frames = match left {
-            _ if every == 0 => None,
-            None => Some(VtkSeries::create(folder)?),
-            Some(left) => Some(left.frames(folder, every)?),
-        };
-        let frames = frames.map(|frames| frames.with_material(scene.material));
+        let frames = folder.filter(|_| every > 0).map(|folder| match left {
+            None => VtkSeries::create(folder),
+            Some(left) => left.frames(folder, every),
+        });
+        let frames = frames.transpose()?.map(|frames| frames.with_material(scene.material));
         Ok(Self {
             scene,
             snapshots: left.map_or_else(Vec::new, |left| left.checkpoint.snapshots.to_vec()),
             probes: left.map_or_else(new_probes, |left| left.checkpoint.probes.to_vec()),
+            probed,
             load_steps: left.map_or_else(Vec::new, |left| left.checkpoint.load_steps.to_vec()),
             frames,
             outputs,
@@ -79,7 +83,8 @@ impl<'a> Recorder<'a> {
     }
 
     /// For a checkpoint.
-    pub fn kept(&mut self) -> Recorded<'_> {
+    pub fn kept(&mut self, engine: &Engine) -> Recorded<'_> {
+        self.receive_probes(engine);
         Recorded {
             snapshots: &self.snapshots,
             probes: &self.probes,
@@ -90,14 +95,17 @@ impl<'a> Recorder<'a> {
     }
 
     pub fn step(&mut self, engine: &Engine) {
-        self.probes.iter_mut().for_each(|probe| probe.record(engine));
+        // Of a part the engine records them itself.
+        if engine.parted().is_none() {
+            self.probes.iter_mut().for_each(|probe| probe.record(engine));
+        }
         if self.outputs.draws() && self.scene.record.figures.contains(&engine.step()) {
             self.snapshots.push(Snapshot::of(engine));
         }
         if load_every(self.scene).is_some_and(|every| engine.step().is_multiple_of(every)) {
             self.measure(engine);
         }
-        if self.frames.is_some() && engine.step().is_multiple_of(self.scene.record.vtk_every) {
+        if self.is_frame(engine.step()) {
             self.write_frame(engine);
         }
         if self.keeps_frames() {
@@ -130,12 +138,28 @@ impl<'a> Recorder<'a> {
         self.load_steps.extend(measured);
     }
 
+    /// Whether there is a frame for ParaView of a step on the way.
+    fn is_frame(&self, step: usize) -> bool {
+        let every = self.scene.record.vtk_every;
+        every > 0 && step.is_multiple_of(every)
+    }
+
     fn write_frame(&mut self, engine: &Engine) {
         let start = Instant::now();
-        if let Some(frames) = &mut self.frames {
-            self.failure = frames.write(engine).err();
-        }
+        let written = match (&mut self.frames, engine.parted()) {
+            (Some(frames), _) => frames.write(engine),
+            (None, Some(team)) => write_piece(engine, team),
+            (None, None) => Ok(()),
+        };
+        self.failure = written.err();
         self.writing += start.elapsed();
+    }
+
+    /// The histories of the probed particles of all parts.
+    fn receive_probes(&mut self, engine: &Engine) {
+        if let Some(team) = engine.parted() {
+            self.probes = probes_of_parts(engine, &self.probed, team);
+        }
     }
 
     pub fn failed(&self) -> bool {
@@ -145,14 +169,15 @@ impl<'a> Recorder<'a> {
     /// The last configuration is drawn wherever any is, and for ParaView always written.
     pub fn finish(mut self, outcome: &Outcome) -> Result<Records, ExportError> {
         let engine = &outcome.engine;
-        let step = engine.step();
+        let (step, every) = (engine.step(), self.scene.record.vtk_every);
+        self.receive_probes(engine);
         if self.outputs.draws() && self.snapshots.last().is_none_or(|last| last.step != step) {
             self.snapshots.push(Snapshot::of(engine));
         }
         if load_every(self.scene).is_some() && self.load_steps.last().is_none_or(|last| last.step != step) {
             self.measure(engine);
         }
-        if self.frames.is_some() && !self.failed() && !step.is_multiple_of(self.scene.record.vtk_every) {
+        if every > 0 && !self.is_frame(step) && !engine.any_of_parts(self.failed()) {
             self.write_frame(engine);
         }
         if let Some(failure) = self.failure {

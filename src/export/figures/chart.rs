@@ -102,7 +102,7 @@ impl Chart {
     }
 
     /// As a page shows it: of long lines what can be seen, landmarks in one line.
-    pub fn on_page(&self) -> Self {
+    pub(crate) fn on_page(&self) -> Self {
         let mut chart = self.clone();
         for series in chart.series.iter_mut().filter(|series| series.style == Style::Line) {
             series.points = thinned(&series.points);

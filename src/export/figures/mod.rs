@@ -115,7 +115,7 @@ pub fn write(svg: &str, folder: &OutputFolder, name: &str) -> Result<Vec<PathBuf
 }
 
 /// The same as these files alone.
-pub fn write_as(
+pub(crate) fn write_as(
     svg: &str,
     folder: &OutputFolder,
     name: &str,

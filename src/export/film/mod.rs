@@ -26,7 +26,7 @@ pub use error::FilmError;
 pub use place::{FilmFile, FilmFormat};
 
 /// Frames of a film at most; of more, every second, third, ... is shown.
-pub const MOST_FRAMES: usize = 300;
+pub(crate) const MOST_FRAMES: usize = 300;
 /// A film lasts about so long \[s\], unless it has too few frames for that or too many.
 const LENGTH: f64 = 8.0;
 /// Time of a frame \[s/100\], the unit of GIF: 25 to 5 frames a second.

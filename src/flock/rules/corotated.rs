@@ -89,7 +89,7 @@ impl Turn {
     }
 
     /// Cosine of the angle between two turns.
-    pub fn cosine_to(self, other: Self) -> f64 {
+    pub(crate) fn cosine_to(self, other: Self) -> f64 {
         self.cos * other.cos + self.sin * other.sin
     }
 
@@ -100,7 +100,7 @@ impl Turn {
     }
 
     /// A vector in the turned axes: `R vector`.
-    pub fn forth(self, [x, y]: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn forth(self, [x, y]: [f64; 2]) -> [f64; 2] {
         [self.cos * x - self.sin * y, self.sin * x + self.cos * y]
     }
 

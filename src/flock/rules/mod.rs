@@ -105,7 +105,7 @@ pub enum Mean {
 
 impl Mean {
     /// Whether its targets are affine in the neighbours' positions, by weights that do not change.
-    pub fn is_affine(&self) -> bool {
+    pub(crate) fn is_affine(&self) -> bool {
         matches!(self, Mean::Barycentre | Mean::Material { rotation: Rotation::Small })
     }
 }
@@ -162,7 +162,7 @@ impl Rule {
     /// The same as [`Rule::target`] for a material of small rotations, which needs only pairs of weight and
     /// position: for sweeps, which have them at hand.
     #[inline]
-    pub fn target_of_material(
+    pub(crate) fn target_of_material(
         &self,
         own: &ParticleState,
         pairs: impl Iterator<Item = (Block, [f64; 2])>,

@@ -34,7 +34,7 @@ pub struct Poisson {
 
 impl Poisson {
     /// Distance function `da` \[1\] at a reference position \[length\].
-    pub fn distance_from_axis(&self, reference: [f64; 2]) -> f64 {
+    pub(crate) fn distance_from_axis(&self, reference: [f64; 2]) -> f64 {
         let across = match self.axis {
             Axis::X => reference[1],
             Axis::Y => reference[0],

@@ -5,7 +5,7 @@ use super::security::SecurityRequest;
 use super::value::integer;
 
 /// Largest domain whose ports fit below 65536 (RTPS 2.3, section 9.6.1: 7400 + 250 domain).
-pub const LARGEST_DOMAIN: u16 = 232;
+pub(crate) const LARGEST_DOMAIN: u16 = 232;
 
 /// How far nodes look for each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -68,7 +68,7 @@ impl Severity {
     }
 
     /// The severity of a number, if there is one.
-    pub fn of_number(number: u32) -> Option<Self> {
+    pub(crate) fn of_number(number: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|severity| severity.number() == number)
     }
 

@@ -45,7 +45,7 @@ impl Reading {
     }
 
     /// How far time went back since last asked \[s\], if it did.
-    pub fn jump_back(&mut self) -> Option<f64> {
+    pub(crate) fn jump_back(&mut self) -> Option<f64> {
         let jump = std::mem::take(&mut self.jump);
         (jump > 0.0).then_some(jump)
     }
@@ -93,7 +93,7 @@ impl Clock {
     }
 
     /// Whether time comes from `/clock`.
-    pub fn is_simulated(&self) -> bool {
+    pub(crate) fn is_simulated(&self) -> bool {
         self.simulated.is_some()
     }
 }

@@ -5,7 +5,7 @@
 /// Participants then find each other only by asking the first few ports of the domain, so of more than
 /// about a dozen participants some stay unseen, without any error. Over a network device they find each other as they
 /// find those of other computers.
-pub fn warn_without_multicast(loopback_only: bool) {
+pub(crate) fn warn_without_multicast(loopback_only: bool) {
     static ONCE: std::sync::Once = std::sync::Once::new();
     ONCE.call_once(|| {
         let devices = std::fs::read_dir("/sys/class/net").into_iter().flatten().flatten();

@@ -171,7 +171,7 @@ impl Edge {
     ///
     /// # Errors
     /// As [`Edge::node`].
-    pub fn named_node(&self, names: &Names) -> Result<Node, EdgeError> {
+    pub(crate) fn named_node(&self, names: &Names) -> Result<Node, EdgeError> {
         let mut node = self.node(names.namespace(), names.node_name())?;
         node.names = names.clone();
         Ok(node)

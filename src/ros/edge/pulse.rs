@@ -133,7 +133,7 @@ impl Pulse {
     }
 
     /// Whether the process is about to end.
-    pub fn is_given_up(&self) -> bool {
+    pub(crate) fn is_given_up(&self) -> bool {
         self.given_up.load(Ordering::Relaxed)
     }
 
@@ -144,7 +144,7 @@ impl Pulse {
 
     /// Records after each tick whether the loop hears any peer. Forged discovery can leave the middleware deaf to all
     /// its peers though otherwise sound; a new one finds them. A process that has never heard a peer waits for one.
-    pub fn note_peers(&self, any_peer: bool) {
+    pub(crate) fn note_peers(&self, any_peer: bool) {
         let mut heard = self.heard.lock().unwrap_or_else(PoisonError::into_inner);
         if any_peer {
             *heard = Some((Instant::now(), self.waited()));
@@ -156,7 +156,7 @@ impl Pulse {
     }
 
     /// Records that the loop listens to no peer for now: its silence then means nothing.
-    pub fn listens_to_none(&self) {
+    pub(crate) fn listens_to_none(&self) {
         *self.heard.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
@@ -172,7 +172,7 @@ impl Pulse {
 
     /// Does work of a loop that is inside, whose time is not counted: opening the topics of many robots takes long in a
     /// sound middleware too. A dead one is noticed by the sample that does not come back.
-    pub fn untimed<T>(&self, work: impl FnOnce() -> T) -> T {
+    pub(crate) fn untimed<T>(&self, work: impl FnOnce() -> T) -> T {
         self.inside_since.store(0, Ordering::Relaxed);
         let done = work();
         self.enter();

@@ -55,7 +55,7 @@ impl Queue {
     }
 
     /// Whether a packet has been taken since the last one that was sent after the last proof.
-    pub fn is_taken(&mut self) -> bool {
+    pub(crate) fn is_taken(&mut self) -> bool {
         let mut head = [0; HEAD];
         let now = match self.theirs.peek_from(&mut head) {
             Ok((length, from)) => Some((from, head[..length].to_vec())),

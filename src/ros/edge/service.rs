@@ -68,7 +68,7 @@ struct Waiting<Request> {
 
 impl<S: ServiceType> Service<S> {
     /// The quality of ROS 2 services: every sample counts, none is kept for late joiners.
-    pub const QUALITY: Quality = Quality::reliable(10);
+    pub(crate) const QUALITY: Quality = Quality::reliable(10);
 
     pub(super) fn new(name: String, reader: Reader, outlet: Arc<Outlet>, shared: Arc<Shared>) -> Self {
         let waiting = RefCell::new(VecDeque::new());

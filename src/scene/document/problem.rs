@@ -100,7 +100,7 @@ impl SceneError {
     }
 
     /// `value` if nothing was found wrong, otherwise the problems, sorted by line with overrides last.
-    pub fn into_result<T>(mut self, value: T) -> Result<T, SceneError> {
+    pub(crate) fn into_result<T>(mut self, value: T) -> Result<T, SceneError> {
         if self.problems.is_empty() {
             return Ok(value);
         }

@@ -21,7 +21,10 @@ pub struct PlaceComparison {
 ///
 /// # Errors
 /// Names a place outside the shape.
-pub fn compare_places(rule: Vec<AtPlace>, truth: &Reference) -> Result<Vec<PlaceComparison>, ReferenceError> {
+pub(crate) fn compare_places(
+    rule: Vec<AtPlace>,
+    truth: &Reference,
+) -> Result<Vec<PlaceComparison>, ReferenceError> {
     let places: Vectors = rule.iter().map(|at| at.place).collect();
     let (moved, stress) = (truth.displacements_at(&places)?, truth.stress_at(&places)?);
     let of = |((rule, displacement), stress): ((AtPlace, [f64; 2]), crate::fem::Stress)| {

@@ -178,7 +178,7 @@ fn is_orthogonal(scene: &Scene, engine: &Engine) -> bool {
 ///
 /// # Errors
 /// As [`Plan::new`].
-pub fn plan_led_by(scene: &Scene, truth: &Reference) -> Result<Plan, SceneError> {
+pub(crate) fn plan_led_by(scene: &Scene, truth: &Reference) -> Result<Plan, SceneError> {
     Plan::of_layout(scene, Layout::new(scene)?, Some(&led_by(truth)))
 }
 

@@ -81,7 +81,7 @@ impl Subject {
     }
 
     /// The meaning of `MT` of Eq. 4, for feedback that is added as well.
-    pub fn feedback_reference(&self) -> FeedbackReference {
+    pub(crate) fn feedback_reference(&self) -> FeedbackReference {
         self.plan.setup.flock.rule.feedback.map_or(FeedbackReference::Initial, |f| f.reference)
     }
 
@@ -101,7 +101,7 @@ impl Subject {
     }
 
     /// Whether frame points remember the step before, so that the sweep is more than one matrix.
-    pub fn has_memory(&self) -> bool {
+    pub(crate) fn has_memory(&self) -> bool {
         self.plan.setup.body.frame.as_ref().is_some_and(|frame| frame.rule.looks_before_the_sweep())
     }
 

@@ -155,7 +155,7 @@ impl Control {
     }
 
     /// Expects poses of these members alone, as a robot's own node does.
-    pub fn listen_to(&mut self, members: &[usize]) {
+    pub(crate) fn listen_to(&mut self, members: &[usize]) {
         self.listens.fill(false);
         members.iter().for_each(|&member| self.listens[member] = true);
     }
@@ -260,12 +260,12 @@ impl Control {
     }
 
     /// As [`Control::place_leader`], for any leader, whose own program ends with this.
-    pub fn take_over(&mut self, member: usize, place: [f64; 2]) -> bool {
+    pub(crate) fn take_over(&mut self, member: usize, place: [f64; 2]) -> bool {
         self.is_believed(place) && self.formation.take_over(member, place)
     }
 
     /// Whether a pose at a place \[m\] would be believed.
-    pub fn is_believed(&self, place: [f64; 2]) -> bool {
+    pub(crate) fn is_believed(&self, place: [f64; 2]) -> bool {
         let watch = self.watch.limits();
         distance(place, watch.centre) <= watch.range
     }
@@ -338,7 +338,7 @@ impl Control {
     ///
     /// # Panics
     /// If there is no such obstacle.
-    pub fn move_obstacle(&mut self, obstacle: usize, by: [f64; 2]) -> Result<(), SafetyError> {
+    pub(crate) fn move_obstacle(&mut self, obstacle: usize, by: [f64; 2]) -> Result<(), SafetyError> {
         let moved = self.filter.obstacles().with_moved(obstacle, by)?;
         self.filter.set_obstacles(moved);
         Ok(())
@@ -559,7 +559,7 @@ impl Control {
     }
 
     /// The members' last known places; those never known are nominal \[m\].
-    pub fn last_places(&self) -> Vectors {
+    pub(crate) fn last_places(&self) -> Vectors {
         let mut places = self.formation.places.clone();
         for member in (0..places.len()).filter(|&member| self.known[member]) {
             places.set(member, self.present.get(member));

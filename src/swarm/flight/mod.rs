@@ -100,7 +100,7 @@ impl Flight {
     }
 
     /// Flies one period; `hear` receives what the control receives.
-    pub fn step_with_observer(&mut self, hear: &mut dyn FnMut(Received)) {
+    pub(crate) fn step_with_observer(&mut self, hear: &mut dyn FnMut(Received)) {
         let now = self.fleet.time();
         self.perform_due();
         let control = &mut self.control;

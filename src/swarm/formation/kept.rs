@@ -61,7 +61,7 @@ impl From<ManoeuvreSnapshot> for Manoeuvre {
 
 impl Formation {
     /// By member.
-    pub fn kept_leads(&self) -> Vec<Option<LeadSnapshot>> {
+    pub(crate) fn kept_leads(&self) -> Vec<Option<LeadSnapshot>> {
         let kept = |lead: &Lead| match lead {
             Lead::External(place) => LeadSnapshot::External(*place),
             Lead::Motion { since, .. } => LeadSnapshot::Motion { since: *since },

@@ -125,12 +125,12 @@ impl Formation {
     }
 
     /// Whether leaders are moved by programs of the swarm, not by those of a scene.
-    pub fn is_led_here(&self) -> bool {
+    pub(crate) fn is_led_here(&self) -> bool {
         !self.is_scene
     }
 
     /// Whether a member's target follows from its neighbours' last known places alone.
-    pub fn can_be_followed_alone(&self) -> bool {
+    pub(crate) fn can_be_followed_alone(&self) -> bool {
         matches!(&self.course, TargetSource::Rule { engine, .. } if engine.update().order == Order::Synchronous)
     }
 
@@ -186,7 +186,7 @@ impl Formation {
 
     /// Sends a leader to a place \[m\], from now on moved from outside; false for a member that no program of the swarm
     /// leads.
-    pub fn take_over(&mut self, member: usize, place: [f64; 2]) -> bool {
+    pub(crate) fn take_over(&mut self, member: usize, place: [f64; 2]) -> bool {
         let is_led = self.leads[member].is_some();
         if is_led {
             self.leads[member] = Some(Lead::External(place));
@@ -340,7 +340,7 @@ impl Formation {
     ///
     /// # Errors
     /// A sentence that names the robot and what it lacks.
-    pub fn require_support(&self, liars: usize) -> Result<(), String> {
+    pub(crate) fn require_support(&self, liars: usize) -> Result<(), String> {
         let lists = (0..self.count()).map(|m| self.neighbours(m).map(|k| k as u32).collect::<Vec<_>>());
         let leaders: Vec<bool> = (0..self.count()).map(|m| self.leads(m)).collect();
         supported(&Neighbours::from_lists(lists), &leaders, liars, self.trim())

@@ -76,7 +76,7 @@ impl DoubleIntegrator {
     }
 
     /// The way from here to where it comes to rest if it brakes from `velocity` \[m/s\] now \[m\].
-    pub fn braking_way(&self, velocity: [f64; 2], dt: f64) -> [f64; 2] {
+    pub(crate) fn braking_way(&self, velocity: [f64; 2], dt: f64) -> [f64; 2] {
         let covered = self.covered(velocity, dt);
         [0, 1].map(|k| covered[k] - 0.5 * dt * velocity[k])
     }

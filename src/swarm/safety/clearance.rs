@@ -9,7 +9,7 @@ const PLACES_ON_THE_WAY: u32 = 4;
 impl Filter {
     /// Least free space around each member while all went straight and evenly from `before` to `after` \[m\]:
     /// between members the least ever, to obstacles at several places on the way. Shapes \[count\].
-    pub fn clearance_on_the_way(&self, before: &Vectors, after: &Vectors, nearest: &mut Vec<f64>) {
+    pub(crate) fn clearance_on_the_way(&self, before: &Vectors, after: &Vectors, nearest: &mut Vec<f64>) {
         nearest.clear();
         nearest.extend(
             (0..after.len()).map(|m| self.obstacle_distance(before.get(m), after.get(m)) - self.radii[m]),

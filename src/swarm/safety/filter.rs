@@ -145,7 +145,7 @@ impl Filter {
     }
 
     /// Keeps members away from these from the next tick on.
-    pub fn set_obstacles(&mut self, obstacles: Obstacles) {
+    pub(crate) fn set_obstacles(&mut self, obstacles: Obstacles) {
         self.obstacles = obstacles;
     }
 
@@ -268,7 +268,7 @@ impl Filter {
     }
 
     /// Whether a member of this radius \[m\] may stand at a place.
-    pub fn is_fenced_in(&self, place: [f64; 2], radius: f64) -> bool {
+    pub(crate) fn is_fenced_in(&self, place: [f64; 2], radius: f64) -> bool {
         self.fence.is_empty() || self.fence.distance(place) >= radius
     }
 

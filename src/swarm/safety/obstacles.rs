@@ -108,7 +108,7 @@ impl Obstacles {
     ///
     /// # Panics
     /// If there is no such obstacle.
-    pub fn with_moved(&self, obstacle: usize, by: [f64; 2]) -> Result<Self, SafetyError> {
+    pub(crate) fn with_moved(&self, obstacle: usize, by: [f64; 2]) -> Result<Self, SafetyError> {
         let mut given = self.given.clone();
         given[obstacle].1 = by;
         Self::of(given)

@@ -163,7 +163,7 @@ pub fn targets(control: &Control, part: &NodeScope) -> Vec<Target> {
 }
 
 /// A member's target and heading after the last tick: straight ahead, or its present heading if it stays.
-pub fn target_of(control: &Control, member: usize) -> Option<Target> {
+pub(crate) fn target_of(control: &Control, member: usize) -> Option<Target> {
     let position = control.target(member)?;
     let here = control.position(member).unwrap_or(position);
     let yaw = match [position[0] - here[0], position[1] - here[1]] {

@@ -84,14 +84,14 @@ impl Lifecycle {
     }
 
     /// Takes the node to finalized from wherever it stands, as a signal to end does.
-    pub fn shut_down(&mut self, now: f64, act: &mut dyn FnMut(Goal) -> Outcome) {
+    pub(crate) fn shut_down(&mut self, now: f64, act: &mut dyn FnMut(Goal) -> Outcome) {
         if let Some(edge) = self.machine.asked(0, "shutdown") {
             self.run(edge, now, act);
         }
     }
 
     /// Takes the node to a state that it had before, by the edges that lead there.
-    pub fn go_to(&mut self, goal: State, now: f64, act: &mut dyn FnMut(Goal) -> Outcome) {
+    pub(crate) fn go_to(&mut self, goal: State, now: f64, act: &mut dyn FnMut(Goal) -> Outcome) {
         // No way is longer, and where there is none nothing happens.
         for _ in 0..3 {
             let label = match (self.state(), goal) {

@@ -61,7 +61,7 @@ impl Store {
     ///
     /// # Errors
     /// The first reason; every value is as before.
-    pub fn set_atomically(&mut self, settings: Vec<(String, Option<Value>)>) -> Result<(), Refusal> {
+    pub(crate) fn set_atomically(&mut self, settings: Vec<(String, Option<Value>)>) -> Result<(), Refusal> {
         let admitted: Result<Vec<_>, _> = settings
             .into_iter()
             .map(|(name, value)| self.admit(&name, value).map(|value| (name, value)))
@@ -93,7 +93,7 @@ impl Store {
     }
 
     /// Changes since the last call, in order.
-    pub fn take_changes(&mut self) -> Vec<Change> {
+    pub(crate) fn take_changes(&mut self) -> Vec<Change> {
         std::mem::take(&mut self.changes)
     }
 

@@ -33,7 +33,7 @@ impl Value {
     }
 
     /// Name of the type as ROS 2's tools print it.
-    pub fn kind_name(&self) -> &'static str {
+    pub(crate) fn kind_name(&self) -> &'static str {
         match self {
             Value::Bool(_) => "bool",
             Value::Integer(_) => "integer",
@@ -51,11 +51,11 @@ impl Value {
         if let Value::Bool(value) = self { Some(*value) } else { None }
     }
 
-    pub fn as_integer(&self) -> Option<i64> {
+    pub(crate) fn as_integer(&self) -> Option<i64> {
         if let Value::Integer(value) = self { Some(*value) } else { None }
     }
 
-    pub fn as_double(&self) -> Option<f64> {
+    pub(crate) fn as_double(&self) -> Option<f64> {
         if let Value::Double(value) = self { Some(*value) } else { None }
     }
 
@@ -104,7 +104,7 @@ impl Value {
     }
 
     /// From the wire; `None` for "not set" and for types that do not exist.
-    pub fn from_wire(wire: ParameterValue) -> Option<Value> {
+    pub(crate) fn from_wire(wire: ParameterValue) -> Option<Value> {
         Some(match wire.kind {
             1 => Value::Bool(wire.bool_value),
             2 => Value::Integer(wire.integer_value),

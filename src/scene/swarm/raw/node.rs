@@ -85,7 +85,7 @@ impl RawNode {
     }
 
     /// Whether all targets are one message.
-    pub fn has_target_array(&self) -> bool {
+    pub(crate) fn has_target_array(&self) -> bool {
         self.target_type == RawTargetType::PoseArray
     }
 

@@ -53,7 +53,7 @@ pub enum Outcome {
 
 impl Outcome {
     /// Right if `error` is within what is stated; an error that is not a number never is.
-    pub fn judged(error: f64, within: f64, check: impl Into<String>) -> Self {
+    pub(crate) fn judged(error: f64, within: f64, check: impl Into<String>) -> Self {
         let check = check.into();
         if error <= within {
             Outcome::Right { error, within, check }

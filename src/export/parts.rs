@@ -1,0 +1,24 @@
+//! Files that ranks write together, each its own, into the folder of the first one.
+
+use std::path::{Path, PathBuf};
+
+use super::error::ExportError;
+use crate::ranks::Team;
+
+/// Has each rank write the file of its name into the `folder`, which the first rank has and all must see. What one of them
+/// cannot write is an error of all.
+pub(super) fn write_each(
+    folder: Option<&Path>,
+    name: impl Fn(usize) -> String,
+    team: &Team,
+    write: impl FnOnce(&Path) -> Result<(), ExportError>,
+) -> Result<(), ExportError> {
+    let own = folder.map_or(&b""[..], |folder| folder.as_os_str().as_encoded_bytes());
+    let folder = PathBuf::from(String::from_utf8_lossy(&team.each_bytes(own)[0]).into_owned());
+    let written = write(&folder.join(name(team.rank())));
+    let failed = team.each([u64::from(written.is_err())]).iter().position(|&[failed]| failed == 1);
+    match failed {
+        Some(rank) if written.is_ok() => Err(ExportError::OnRank { rank, path: folder.join(name(rank)) }),
+        _ => written,
+    }
+}
