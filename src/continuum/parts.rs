@@ -24,7 +24,7 @@ use crate::sweep::rows::usual_band;
 /// The key for which a scene has to be laid out as a whole, on every rank; `None` where each can lay out its part.
 pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
     let weights = matches!(scene.weights, Some(Weights::Solved | Weights::Gradient { .. }));
-    let keys: [(bool, &str); 9] = [
+    let keys: [(bool, &str); 8] = [
         (!matches!(scene.body, BodySource::Cut(_)), "body.shape"),
         (scene.is_fitted, "body.outline"),
         (matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. }), "neighbours.kind"),
@@ -32,7 +32,6 @@ pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
         (scene.update.order == Order::Sequential, "update.order"),
         (scene.equilibrium.is_some(), "equilibrium"),
         (scene.load_steps.is_some(), "load_steps"),
-        (!scene.record.places.is_empty(), "record.places"),
         (scene.actions.iter().any(|action| !action.is_cut()), "actions"),
     ];
     let of_role = |(k, entry): (usize, &RoleEntry)| {

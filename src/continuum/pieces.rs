@@ -103,8 +103,7 @@ pub fn require_connected(body: &Body, neighbours: &Neighbours, team: &Team) -> R
 /// The cells of a part among those of the whole body: the number of the first one that stands here, and those that belong to this
 /// part, as their first corners do.
 pub fn owned_cells(body: &Body, cells: &Cells, team: &Team) -> (usize, Range<usize>) {
-    let owned = body.owned();
-    let owned = cells.before(owned.start)..cells.before(owned.end);
+    let owned = cells.owned(body);
     let counts = team.each([owned.len() as u64]);
     let before: u64 = counts.iter().take(team.rank()).map(|[count]| count).sum();
     (before as usize - owned.start, owned)

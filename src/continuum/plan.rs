@@ -101,6 +101,7 @@ impl Plan {
         }
         let mut plan = agreed(scene, team, Self::of_roles(scene, layout, changes))?;
         plan.require_held_together(scene, team)?;
+        places::around(scene, (&plan.setup.body, plan.setup.cells.as_ref()), Some(team))?;
         if plan.setup.flock.bonds.is_some() && u32::try_from(plan.setup.body.total()).is_err() {
             let message = "broken bonds are known by particles up to number 4,294,967,295";
             return Err(scene.refuse("body.shape", message, "use a wider spacing or a smaller shape"));
@@ -149,7 +150,10 @@ impl Plan {
     fn of_roles(scene: &Scene, layout: Layout, changes: Vec<RoleChange>) -> Result<Self, SceneError> {
         let following = Following::new(scene, &layout, &changes)?;
         let probes = probes(scene, &layout.body)?;
-        places::around(scene, layout.cells.as_ref(), &layout.body.reference)?;
+        // For all parts to find out.
+        if layout.body.part.is_none() {
+            places::around(scene, (&layout.body, layout.cells.as_ref()), None)?;
+        }
         require_listable(scene, &layout.body)?;
         let actions = actions(scene, &layout, &changes)?;
         let Layout { body, neighbours, cells, outline, .. } = layout;

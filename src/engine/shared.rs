@@ -20,7 +20,6 @@ use crate::flock::body::{Body, Part};
 use crate::flock::fracture::{Bonds, Break};
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::vectors::{Vectors, distance};
-use crate::material::cells::Cells;
 use crate::ranks::Team;
 use crate::sweep::caches::Caches;
 use crate::sweep::domain::{Domain, Halo, Held, Needs, Share};
@@ -160,12 +159,7 @@ impl Engine {
 
     /// The cells that belong to this part of the body, as their first corners do; all of a whole one.
     pub fn owned_cells(&self) -> Range<usize> {
-        let owned = self.body.owned();
-        let of = |cells: &Cells| match self.body.part {
-            Some(_) => cells.before(owned.start)..cells.before(owned.end),
-            None => 0..cells.count(),
-        };
-        self.cells.as_ref().map_or(0..0, of)
+        self.cells.as_ref().map_or(0..0, |cells| cells.owned(&self.body))
     }
 
     /// The id of the first particle whose position is not finite.

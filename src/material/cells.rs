@@ -191,6 +191,14 @@ impl Cells {
         starts.partition_point(|&start| (self.index[start as usize] as usize) < particle)
     }
 
+    /// The cells that belong to this part of a body, as their first corners do; all of a whole one.
+    pub fn owned(&self, body: &Body) -> Range<usize> {
+        match &body.part {
+            Some(part) => self.before(part.owned.start)..self.before(part.owned.end),
+            None => 0..self.count(),
+        }
+    }
+
     /// Number of cells.
     pub fn count(&self) -> usize {
         self.kind.len()

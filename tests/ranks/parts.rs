@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use flockform::continuum::digest::{digest, digest_of_parts};
 use flockform::continuum::mechanics::{Mechanics, Stresses};
 use flockform::continuum::parts::laid_out_whole_for;
+use flockform::continuum::places::at_places;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{run_shared, run_watched};
 use flockform::engine::Engine;
@@ -133,7 +134,8 @@ fn measured(scene: &Scene, engine: &Engine) -> (String, Vec<u64>) {
     let of =
         |stress: Option<StressState>| stress.map_or([1; 3], |stress| stress.components.map(f64::to_bits));
     let readings = Mechanics::under(&stresses, engine, elastic).expect("there are cells");
-    (format!("{readings:#?}"), own.flat_map(of).collect())
+    let places = at_places(scene, engine, &stresses);
+    (format!("{readings:#?} {places:#?}"), own.flat_map(of).collect())
 }
 
 /// The histories of a run alone that is looked at in each step, and what is measured at its end.
@@ -341,7 +343,8 @@ fn a_large_material_in_parts_too() {
 #[test]
 fn loads_on_a_body_in_parts_are_those_on_one_laid_out_as_a_whole() {
     let grid = "body={shape={kind=\"grid\",columns=24,rows=9}}";
-    let probes = "record.probes=[1,30,61,100]";
+    // Of the places one may be outside, one is on a side of two cells, one at a particle.
+    let probes = "record={probes=[1,30,61,100],places=[[16.3,5.8],[2.1,5.5],[20.9,5.0],[12.0,6.0],[7.0,7.3],[15.0,2.5]]}";
     let released = "roles[1]={region={kind=\"edge\",side=\"top\"},role=\"clamped\",from=30}";
     let pressure = "{kind=\"pressure\",region={kind=\"outline\",hole=1},pressure=9.0}";
     let traction = "{kind=\"traction\",region={kind=\"edge\",side=\"top\",depth=4.0},traction=[2.0,7.0],\
@@ -439,7 +442,8 @@ fn a_material_in_parts_is_refused_for_what_it_is_refused_for_as_a_whole() {
         ("no neighbours", &[few]),
         ("no chain of cells", &[apart, far]),
         ("are not connected", &[apart]),
+        ("a spacing away from the body", &["record={places=[[12.0,8.0],[8.4,4.3]]}"]),
     ] {
-        assert_refused_the_same(&plate(PLATE, &[sets, &["record.probes=[]"]].concat()), what);
+        assert_refused_the_same(&plate(PLATE, &[&["record.probes=[]"], sets].concat()), what);
     }
 }
