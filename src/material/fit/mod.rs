@@ -26,7 +26,7 @@ use std::sync::Arc;
 
 use self::cut::{Faces, Node};
 use self::near::NearPieces;
-use self::sites::Sites;
+use self::sites::{Columns, Sites};
 use super::cells::{Cells, templates};
 use super::stiffness::area;
 use crate::flock::body::{Body, OutlineParticles};
@@ -210,13 +210,8 @@ pub fn fit(lattice: &Lattice, outline: &Outline) -> Result<Fitted, FitError> {
 /// # Errors
 /// As [`fit`].
 pub fn fit_regions(lattice: &Lattice, outline: &Partition) -> Result<Fitted, FitError> {
-    let scale = Scale::of(lattice);
-    let near = NearPieces::new(outline, scale.diameter);
-    narrow::require_wide(outline, &near, scale.spacing)?;
-    let sites = Sites::find(lattice, outline, &scale)?;
-    let mut faces = cut::cut((lattice, outline, &near), &scale, &sites)?;
-    tidy::tidy(&mut faces, &scale);
-    Ok(Assembly { lattice, outline, scale: &scale, sites: &sites, faces: &faces }.body())
+    sites::require_few(lattice, outline.outline())?;
+    Band::of(lattice, outline)?.body()
 }
 
 impl Fitted {
@@ -245,57 +240,96 @@ impl Fitted {
     }
 }
 
-/// The parts that a body is put together from.
-struct Assembly<'a> {
-    lattice: &'a Lattice,
-    outline: &'a Partition,
-    scale: &'a Scale,
-    sites: &'a Sites,
-    faces: &'a Faces,
+/// What an outline decides on: the sites and cells near it. All that is farther inside is lattice.
+#[derive(Debug)]
+pub struct Band {
+    lattice: Lattice,
+    outline: Partition,
+    scale: Scale,
+    sites: Sites,
+    faces: Faces,
+    /// Whether each node is a particle, shape \[nodes\].
+    used: Vec<bool>,
+    /// The nodes that are particles and stand at no site, in their order along the outline.
+    along: Vec<u32>,
+    /// Number of each node in `along`, shape \[nodes\]; [`u32::MAX`] of all others.
+    number_along: Vec<u32>,
 }
 
-impl Assembly<'_> {
-    fn body(&self) -> Fitted {
-        let mut used = vec![false; self.faces.nodes.len()];
-        self.faces.cells().flat_map(|face| &face.corners).for_each(|&node| used[node as usize] = true);
-        for (number, near) in self.sites.near().iter().enumerate() {
-            used[number] |= self.is_in_far_cell(near.site);
+impl Band {
+    /// Fits the cells near an outline.
+    ///
+    /// # Errors
+    /// As [`fit`].
+    pub fn of(lattice: &Lattice, outline: &Partition) -> Result<Self, FitError> {
+        let scale = Scale::of(lattice);
+        let near = NearPieces::new(outline, scale.diameter);
+        narrow::require_wide(outline, &near, scale.spacing)?;
+        let sites = Sites::find(lattice, outline, &scale)?;
+        let mut faces = cut::cut((lattice, outline, &near), &scale, &sites)?;
+        tidy::tidy(&mut faces, &scale);
+        let (lattice, outline) = (lattice.clone(), outline.clone());
+        let (used, number_along) = (vec![false; faces.nodes.len()], vec![u32::MAX; faces.nodes.len()]);
+        let mut band = Self { lattice, outline, scale, sites, faces, used, along: Vec::new(), number_along };
+        band.find_particles();
+        Ok(band)
+    }
+
+    fn find_particles(&mut self) {
+        for &node in self.faces.cells().flat_map(|face| &face.corners) {
+            self.used[node as usize] = true;
         }
-        // Lattice sites near the outline that are in cells, and those far from it, in the order of sites.
-        let near = self.faces.nodes.iter().zip(&used).filter(|(_, used)| **used);
-        let near = near.filter_map(|(node, _)| node.site);
-        let mut sites: Vec<Site> = self.sites.far_inside().chain(near).collect();
-        sites.sort_unstable();
-        let regular = sites.len();
-        let index = |site: Site| sites.binary_search(&site).map_or(u32::MAX, |i| i as u32);
+        for (number, near) in self.sites.near().iter().enumerate() {
+            self.used[number] |= self.is_in_far_cell(near.site);
+        }
         let mut along: Vec<(Place, u32)> = Vec::new();
-        let mut particle = vec![u32::MAX; self.faces.nodes.len()];
-        for (number, node) in self.faces.nodes.iter().enumerate().filter(|(number, _)| used[*number]) {
+        for (number, node) in (0..).zip(&self.faces.nodes).filter(|(number, _)| self.used[*number as usize]) {
             match (node.site, node.place) {
-                (Some(site), _) => particle[number] = index(site),
-                (None, Some(place)) => along.push((place, number as u32)),
+                (Some(_), _) => {}
+                (None, Some(place)) => along.push((place, number)),
                 (None, None) => unreachable!("a node stands at a site or on the outline"),
             }
         }
         along.sort_by(|(a, _), (b, _)| order(a, b));
-        for (k, (_, node)) in along.iter().enumerate() {
-            particle[*node as usize] = (regular + k) as u32;
+        self.along = along.into_iter().map(|(_, node)| node).collect();
+        (0..).zip(&self.along).for_each(|(k, &node)| self.number_along[node as usize] = k);
+    }
+
+    /// The whole body.
+    ///
+    /// # Errors
+    /// More sites in its bounds than can be looked at together.
+    pub fn body(&self) -> Result<Fitted, FitError> {
+        let columns = self.sites.columns(&self.lattice, self.sites.all_columns())?;
+        // Lattice sites near the outline that are in cells, and those far from it, in the order of sites.
+        let near = self.faces.nodes.iter().zip(&self.used).filter(|(_, used)| **used);
+        let near = near.filter_map(|(node, _)| node.site);
+        let mut sites: Vec<Site> = columns.far_inside().chain(near).collect();
+        sites.sort_unstable();
+        let regular = sites.len();
+        let index = |site: Site| sites.binary_search(&site).map_or(u32::MAX, |i| i as u32);
+        let mut particle = vec![u32::MAX; self.faces.nodes.len()];
+        for (number, node) in self.faces.nodes.iter().enumerate().filter(|(number, _)| self.used[*number]) {
+            particle[number] = match node.site {
+                Some(site) => index(site),
+                None => regular as u32 + self.number_along[number],
+            };
         }
         let place = |node: &Node| node.point;
         let reference: Vectors = sites
             .iter()
             .map(|&site| self.lattice.position(site))
-            .chain(along.iter().map(|&(_, node)| place(&self.faces.nodes[node as usize])))
+            .chain(self.along.iter().map(|&node| place(&self.faces.nodes[node as usize])))
             .collect();
         let mut places = vec![None; reference.len()];
-        for (number, node) in self.faces.nodes.iter().enumerate().filter(|(number, _)| used[*number]) {
+        for (number, node) in self.faces.nodes.iter().enumerate().filter(|(number, _)| self.used[*number]) {
             // Only what bounds the body is its outline.
             places[particle[number] as usize] =
                 node.place.filter(|place| self.outline.is_bounding(place.ring));
         }
-        let cells = self.cells(&sites, &particle, &reference);
+        let cells = self.cells(&columns, &sites, &particle, &reference);
         let step = if self.lattice.is_site([0, 1]) { 1 } else { 2 };
-        sites.extend((0..along.len() as i32).map(|k| [Body::ALONG_OUTLINE, k * step]));
+        sites.extend((0..self.along.len() as i32).map(|k| [Body::ALONG_OUTLINE, k * step]));
         let body = Body {
             lattice: self.lattice.clone(),
             is_frame: vec![false; sites.len()],
@@ -306,12 +340,12 @@ impl Assembly<'_> {
             outline: Some(Arc::new(OutlineParticles { regular, places })),
             part: None,
         };
-        Fitted { body, cells }
+        Ok(Fitted { body, cells })
     }
 
-    /// Whether a cell that is too far from the outline to be cut is inside.
-    fn is_far_cell(&self, [i, j]: Site, kind: usize) -> bool {
-        let inside = |corner: &Site| self.sites.is_inside([i + corner[0], j + corner[1]]);
+    /// Whether a cell that is too far from the outline to be cut is inside, as its corners are.
+    fn is_far_cell(&self, [i, j]: Site, kind: usize, is_inside: impl Fn(Site) -> bool) -> bool {
+        let inside = |corner: &Site| is_inside([i + corner[0], j + corner[1]]);
         !self.faces.is_candidate([i, j], kind) && self.scale.templates[kind].iter().all(inside)
     }
 
@@ -320,20 +354,22 @@ impl Assembly<'_> {
             let corners = self.scale.templates[kind].iter().map(move |corner| [i - corner[0], j - corner[1]]);
             corners.filter(|&base| self.lattice.is_site(base) && self.lattice.sublattice(base) == 0)
         };
-        let is_base = |kind: usize| bases(kind).any(|base| self.is_far_cell(base, kind));
-        self.sites.is_inside([i, j]) && (0..self.scale.templates.len()).any(is_base)
+        let is_inside = |site: Site| self.sites.is_inside(site);
+        let is_base = |kind: usize| bases(kind).any(|base| self.is_far_cell(base, kind, is_inside));
+        is_inside([i, j]) && (0..self.scale.templates.len()).any(is_base)
     }
 
     /// Whole cells by their first corner, then the others.
-    fn cells(&self, sites: &[Site], particle: &[u32], reference: &Vectors) -> Cells {
-        let mut cells = Cells::of_lattice(self.lattice, self.outline.regions().len() + 1);
+    fn cells(&self, columns: &Columns<'_>, sites: &[Site], particle: &[u32], reference: &Vectors) -> Cells {
+        let mut cells = Cells::of_lattice(&self.lattice, self.outline.regions().len() + 1);
         let index = |site: Site| sites.binary_search(&site).ok().map(|i| i as u32);
+        let is_inside = |site: Site| columns.is_inside(site);
         let mut corners = Vec::new();
         for &[i, j] in sites.iter().filter(|&&site| self.lattice.sublattice(site) == 0) {
             for (kind, template) in self.scale.templates.iter().enumerate() {
                 let region = match self.faces.whole([i, j], kind) {
-                    None if self.is_far_cell([i, j], kind) => {
-                        self.sites.region(template.iter().map(|c| [i + c[0], j + c[1]]))
+                    None if self.is_far_cell([i, j], kind, is_inside) => {
+                        columns.region(template.iter().map(|c| [i + c[0], j + c[1]]))
                     }
                     region => region,
                 };
