@@ -329,6 +329,14 @@ impl Sites {
 }
 
 impl Columns<'_> {
+    pub fn has_column(&self, column: i32) -> bool {
+        (0..self.window.columns).contains(&(i64::from(column) - i64::from(self.window.low[0])))
+    }
+
+    pub fn has(&self, site: Site) -> bool {
+        self.window.number(site).is_some()
+    }
+
     /// See [`Sites::is_inside`].
     pub fn is_inside(&self, site: Site) -> bool {
         match self.window.number(site).map(|cell| self.marks[cell]) {
