@@ -209,7 +209,7 @@ impl<'a> Checkpointer<'a> {
         let path = folder.as_ref().map_or(&b""[..], |folder| folder.folder().as_os_str().as_encoded_bytes());
         let paths = team.each_bytes(path);
         let state = EngineState::of(engine);
-        let first = engine.body().first() + engine.body().owned().start;
+        let first = engine.body().index_from(engine.body().owned().start);
         let parts = team.each([first as u64, state.count() as u64]);
         let of = (&self.asked, self.scene, self.digest);
         let probes = probes_of_parts(engine, probes, team);

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::mechanics::Stresses;
+use super::pieces::CellNumbers;
 use crate::engine::Engine;
 use crate::flock::body::Body;
 use crate::material::cells::Cells;
@@ -37,22 +38,28 @@ pub fn around(
 ) -> Result<Vec<Option<Around>>, SceneError> {
     // An outline of chords may be that far from the shape.
     let reach = scene.lattice.spacing();
+    let numbers = cells.map(|cells| CellNumbers::of(body, cells, team));
     let of = |(k, &place): (usize, &[f64; 2])| {
         let key = format!("record.places[{k}]");
-        let Some(cells) = cells else {
+        let (Some(cells), Some(numbers)) = (cells, &numbers) else {
             let message = "there are no cells to find a place in: the scene has no material";
             return Err(scene.refuse(&key, message, "add [material], or name particles in record.probes"));
         };
-        let (own, apart) = Around::nearest(place, (cells, cells.owned(body)), &body.reference)
-            .map_or((None, f64::INFINITY), |(around, apart)| (Some(around), apart));
-        let ranks = team.map_or(vec![[apart.to_bits()]], |team| team.each([apart.to_bits()]));
-        let ranks = ranks.into_iter().map(|[apart]| f64::from_bits(apart)).enumerate();
-        // The first of several ranks, as of several cells.
-        let nearest = ranks.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, apart)| *apart <= reach);
+        let own = numbers.owned.iter().cloned().flatten();
+        let own = Around::nearest(place, (cells, own), &body.reference);
+        let found = own.as_ref().map_or([f64::INFINITY.to_bits(), u64::MAX], |(_, cell, apart)| {
+            [apart.to_bits(), numbers.number(*cell) as u64]
+        });
+        let ranks = team.map_or_else(|| Vec::from([found]), |team| team.each(found));
+        // The first of several cells, whose rank has it.
+        let order = |a: &[u64; 2], b: &[u64; 2]| {
+            f64::from_bits(a[0]).total_cmp(&f64::from_bits(b[0])).then(a[1].cmp(&b[1]))
+        };
+        let nearest = ranks.into_iter().min_by(order).filter(|of| f64::from_bits(of[0]) <= reach);
         let help = "give a place of the undeformed body";
-        let (rank, _) =
+        let nearest =
             nearest.ok_or_else(|| scene.refuse(&key, "is more than a spacing away from the body", help))?;
-        Ok(own.filter(|_| team.is_none_or(|team| team.rank() == rank)))
+        Ok(own.filter(|_| found == nearest).map(|(around, ..)| around))
     };
     scene.record.places.iter().enumerate().map(of).collect()
 }

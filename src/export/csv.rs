@@ -106,7 +106,23 @@ pub fn write_final_of_parts(
     stresses: Option<&[Option<StressState>]>,
     team: &Team,
 ) -> Result<(), ExportError> {
-    let rows = || final_rows(engine, stresses);
+    let body = engine.body();
+    let later = body.owned().filter(|&i| body.index_after_all(i).is_some()).count();
+    let before = body.owned().len() - later;
+    let rows = || final_rows(engine, stresses).take(before);
+    // Those along an outline come after all others, in their own order.
+    let later = || {
+        let own = text_of(final_rows(engine, stresses).skip(before)).unwrap_or_default();
+        let all = team.each_bytes(&own).concat();
+        let mut lines: Vec<&[u8]> = all.split_inclusive(|&byte| byte == b'\n').collect();
+        let id = |line: &[u8]| {
+            line.iter()
+                .take_while(|byte| byte.is_ascii_digit())
+                .fold(0, |id, digit| 10 * id + u64::from(digit - b'0'))
+        };
+        lines.sort_by_key(|line| id(line));
+        lines.concat()
+    };
     let Some(folder) = folder else {
         let mut rows = rows().peekable();
         while rows.peek().is_some() {
@@ -114,6 +130,7 @@ pub fn write_final_of_parts(
             team.send_bytes(&text_of(piece).unwrap_or_default());
         }
         team.send_bytes(&[]);
+        let _ = later();
         return Ok(());
     };
     let path = folder.path(FINAL);
@@ -131,7 +148,9 @@ pub fn write_final_of_parts(
             file = file.and_then(|mut file| file.write_all(&piece).map(|()| file));
         }
     }
-    file.and_then(|mut file| file.flush()).map_err(ExportError::io("write", &path))
+    let later = later();
+    file.and_then(|mut file| file.write_all(&later).and_then(|()| file.flush()))
+        .map_err(ExportError::io("write", &path))
 }
 
 const FINAL: &str = "final.csv";
@@ -162,7 +181,11 @@ fn final_rows(engine: &Engine, stresses: Option<&[Option<StressState>]>) -> impl
     let lowest = body.part.as_ref().map_or_else(|| [lowest(0), lowest(1)], |part| part.whole.lowest);
     let [first_column, first_row] = lowest.map(i64::from);
     // Energies and strains are found as they are written: all of them at once would take as much memory as the body.
-    let rows = body.owned().map(|row| body.in_row(row));
+    let order = body.part.as_ref().map(|_| body.owned_in_order());
+    let rows = body
+        .owned()
+        .enumerate()
+        .map(move |(n, row)| order.as_ref().map_or_else(|| body.in_row(row), |order| order[n]));
     rows.map(|i| (i, engine.strain(i))).map(move |(i, strain)| FinalRow {
         id: body.id(i),
         column: of_lattice(i).then(|| i64::from(body.sites[i][0]) - first_column + 1),

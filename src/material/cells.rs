@@ -185,18 +185,26 @@ impl Cells {
         self.kind.push(kind);
     }
 
-    /// How many cells have their first corner before a particle, of a body whose cells are in the order of these.
+    /// How many whole cells have their first corner before a particle, where they are in the order of these.
     pub fn before(&self, particle: usize) -> usize {
-        let starts = &self.starts[..self.count()];
+        let starts = &self.starts[..self.count_whole()];
         starts.partition_point(|&start| (self.index[start as usize] as usize) < particle)
     }
 
-    /// The cells that belong to this part of a body, as their first corners do; all of a whole one.
-    pub fn owned(&self, body: &Body) -> Range<usize> {
-        match &body.part {
-            Some(part) => self.before(part.owned.start)..self.before(part.owned.end),
-            None => 0..self.count(),
+    /// The cells that belong to this part of a body, as their first corners do, ascending in stretches; all of a whole one.
+    pub fn owned(&self, body: &Body) -> Vec<Range<usize>> {
+        if body.part.is_none() {
+            return std::iter::once(0..self.count()).collect();
         }
+        let owned = body.owned();
+        let is_own = |cell: &usize| owned.contains(&(self.of(*cell)[0] as usize));
+        let cut = (self.count_whole()..self.count()).filter(is_own).map(|cell| cell..cell + 1);
+        std::iter::once(self.before(owned.start)..self.before(owned.end)).chain(cut).collect()
+    }
+
+    /// How many cells are whole: the first ones.
+    pub fn count_whole(&self) -> usize {
+        self.kind.partition_point(|&kind| (kind as usize) < self.whole)
     }
 
     /// Number of cells.

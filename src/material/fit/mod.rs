@@ -301,9 +301,32 @@ impl Band {
         self.faces.cells().all(|face| face.whole.is_some())
     }
 
-    /// Particles that stand at no site.
-    pub fn along(&self) -> usize {
-        self.along.len()
+    /// Particles that stand at no site, by their number, and the place of each \[length\].
+    pub fn along(&self) -> impl ExactSizeIterator<Item = [f64; 2]> {
+        self.along.iter().map(|&node| self.faces.nodes[node as usize].point)
+    }
+
+    /// Places \[length\] of all particles near the outline.
+    pub fn places(&self) -> impl Iterator<Item = [f64; 2]> {
+        self.faces.nodes.iter().zip(&self.used).filter(|(_, used)| **used).map(|(node, _)| node.point)
+    }
+
+    /// Where on the outline the particles at these sites are.
+    pub fn outline_of(&self, sites: &[Site]) -> OutlineParticles {
+        let of = |&site: &Site| {
+            let number = self.sites.number(site)? as usize;
+            let node = &self.faces.nodes[number];
+            node.place.filter(|place| self.used[number] && self.outline.is_bounding(place.ring))
+        };
+        OutlineParticles { regular: sites.len(), places: sites.iter().map(of).collect() }
+    }
+
+    /// The sites of some columns at which particles stand, ascending.
+    ///
+    /// # Errors
+    /// More columns than can be looked at together.
+    pub fn sites(&self, columns: Range<i32>) -> Result<Vec<Site>, FitError> {
+        Ok(self.regular(&self.sites.columns(&self.lattice, columns)?))
     }
 
     /// The columns in which something may stand.
@@ -350,7 +373,7 @@ impl Band {
         for &node in self.along.iter().filter(|&&node| columns.contains(&self.column_of(node))) {
             add(self.faces.nodes[node as usize].point, Extent::NONE.lowest);
         }
-        for site in self.regular(&self.sites.columns(&self.lattice, columns.clone())?) {
+        for site in self.sites(columns.clone())? {
             add(self.lattice.position(site), site);
             census.counts[(site[0] - columns.start) as usize] += 1;
         }
@@ -421,6 +444,11 @@ impl Band {
         let here = part.along.iter().enumerate().filter(|(_, here)| **here != u32::MAX);
         let mut along: Vec<[usize; 2]> = here.map(|(k, &here)| [here as usize, k]).collect();
         along.sort_unstable();
+        let column = |site: &Site| match site[0] {
+            Body::ALONG_OUTLINE => self.column_of(self.along[(site[1] / step) as usize]),
+            column => column,
+        };
+        let numbers = Numbers { along, cut, columns: part.sites.iter().map(column).collect() };
         let Laid { sites, reference, .. } = part;
         let body = Body {
             lattice: self.lattice.clone(),
@@ -432,7 +460,7 @@ impl Band {
             outline: Some(Arc::new(OutlineParticles { regular: regular.len(), places })),
             part: None,
         };
-        Ok((Fitted { body, cells }, Numbers { along, cut }))
+        Ok((Fitted { body, cells }, numbers))
     }
 
     /// The particle that a node is, if it is one of those laid out.
@@ -513,6 +541,8 @@ pub struct Numbers {
     pub along: Vec<[usize; 2]>,
     /// Of each cut cell its number among all such.
     pub cut: Vec<usize>,
+    /// The column that each particle is counted with; ascending in a part.
+    pub columns: Vec<i32>,
 }
 
 /// The particles that are laid out.
