@@ -287,10 +287,30 @@ fn ranks_with_different_programs_are_refused() {
 /// What keeps a run from being looked at as a whole: each rank lays out a part of the body.
 const PARTED: [&str; 3] = ["--no-report", "--figures", "none"];
 
+/// A plate whose outline is kept.
+const FITTED: &str = r#"
+title = "A plate whose outline is kept"
+lattice = { kind = "hexagonal", spacing = 1.0 }
+rule = { mean = { kind = "material" } }
+material = { kind = "isotropic", young = 1000.0, poisson = 0.3 }
+stop = { steps = 60 }
+loads = [{ kind = "pressure", region = { kind = "outline", hole = 1 }, pressure = 9.0 }]
+record = { probes = [1, 300, 900, 1000], places = [[33.5, 5.0], [90.0, 7.0]] }
+
+[body]
+shape = { kind = "polygon", vertices = [[0, 0], [60, -0.4], [120, 3.7], [90, 10.9], [1, 8]] }
+holes = [{ kind = "disc", centre = [30, 4.3], radius = 2.1 }]
+
+[[roles]]
+region = { kind = "edge", side = "left", depth = 2.0 }
+role = "clamped"
+"#;
+
 #[test]
 #[ignore = "needs mpirun"]
 fn a_run_in_parts_writes_the_tables_of_a_run_alone() {
     let folder = temporary();
+    std::fs::write(folder.path().join("fitted.toml"), FITTED).expect("written");
     let fine = ["--set", "body.shape={kind=\"grid\",columns=300,rows=40}", "--steps", "100"];
     let when = "roles[2]={region={kind=\"all\"},role=\"ghost\",from=9,when={quantity=\"pe1\",above=0.3}}";
     for (name, more) in [
@@ -299,6 +319,7 @@ fn a_run_in_parts_writes_the_tables_of_a_run_alone() {
         ("lattice-honeycomb", &[]),
         ("fracture", &["--steps", "80"]),
         ("tension", &["--set", when, "--steps", "60"]),
+        ("fitted.toml", &[]),
     ] {
         let run = |out: &'static str| [&["run", name, "--out", out][..], &PARTED, more].concat();
         assert_ends_well(&flockform(&run("alone"), folder.path()), name);

@@ -243,7 +243,7 @@ impl<'a> Checkpointer<'a> {
         let state = (EngineState::of(engine), residual);
         let mut checkpoint = Checkpoint::new(of, state, recorded, self.stepping());
         if let Some(team) = engine.parted() {
-            let first = engine.body().first() + engine.body().owned().start;
+            let first = engine.body().index_from(engine.body().owned().start);
             let folder = folder.as_deref().map(OutputFolder::folder);
             checkpoint = checkpoint.with_parts(folder, (first, team), synced)?;
         } else {

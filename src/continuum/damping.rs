@@ -4,10 +4,13 @@
 //! largest eigenvalue of `D^-1 K` may be larger: it belongs to a motion of a few particles there, which a power
 //! iteration over the particles near the outline finds.
 
-use crate::flock::block::apply;
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+use crate::flock::block::{Block, apply};
 use crate::flock::body::Body;
 use crate::flock::law::MatrixWeights;
 use crate::flock::neighbourhood::Neighbours;
+use crate::ranks::Team;
 
 /// Rings of neighbours around the particles along the outline that the iteration covers.
 const RINGS: usize = 2;
@@ -17,48 +20,111 @@ const SAFETY: f64 = 1.03;
 /// Part of the largest damping at which nothing grows.
 const OF_LIMIT: f64 = 0.9;
 
-/// The damping of a synchronous update, at most `inside` \[1\], which suits the inside of the body.
-pub fn along_outline(body: &Body, neighbours: &Neighbours, weights: &MatrixWeights, inside: f64) -> f64 {
-    let Some(outline) = &body.outline else { return inside };
-    let mut is_member = vec![false; body.count()];
-    let mut members: Vec<usize> = (outline.regular..body.count()).collect();
-    members.iter().for_each(|&i| is_member[i] = true);
-    let mut fresh = members.clone();
-    for _ in 0..RINGS {
-        let around: Vec<usize> = fresh.iter().flat_map(|&i| neighbours.of(i)).map(|&j| j as usize).collect();
-        fresh.clear();
-        for j in around {
-            if !std::mem::replace(&mut is_member[j], true) {
-                fresh.push(j);
-            }
-        }
-        members.extend(&fresh);
+/// The damping of a synchronous update, at most `inside` \[1\], which suits the inside of the body. Of a body of which each rank has
+/// a part all find it together.
+pub fn along_outline(
+    body: &Body,
+    neighbours: &Neighbours,
+    weights: &MatrixWeights,
+    inside: f64,
+    team: Option<&Team>,
+) -> f64 {
+    if body.outline.is_none() {
+        return inside;
     }
+    let is_along = |i: usize| body.sites[i][0] == Body::ALONG_OUTLINE;
+    let here = rings((0..body.count()).filter(|&i| is_along(i)), |i| {
+        Some(neighbours.of(i).iter().map(|&j| j as usize))
+    });
+    let owned = body.owned();
+    let row = |i: usize| {
+        let blocks = weights.of(i).iter().zip(neighbours.of(i));
+        let blocks = blocks.map(|(block, &j)| (body.index(j as usize), *block)).collect();
+        (body.index(i), Row { is_along: is_along(i), blocks })
+    };
+    let own = here.into_iter().filter(|i| owned.contains(i)).map(row);
+    let rows: BTreeMap<usize, Row> = match team {
+        None => own.collect(),
+        Some(team) => {
+            let words: Vec<u64> = own.flat_map(|(index, row)| row.words(index)).collect();
+            Row::of_words(&team.gather_all(&words))
+        }
+    };
+    let along = rows.iter().filter(|(_, row)| row.is_along).map(|(&index, _)| index);
+    let members = rings(along, |index| Some(rows.get(&index)?.blocks.iter().map(|(other, _)| *other)));
     if members.is_empty() {
         return inside;
     }
-    let start = |i: usize| [(7.1 * i as f64).sin(), (3.7 * i as f64 + 1.0).sin()];
-    let mut moved = vec![[0.0; 2]; body.count()];
-    members.iter().for_each(|&i| moved[i] = start(i));
+    let number: HashMap<usize, usize> = members.iter().zip(0..).map(|(&index, k)| (index, k)).collect();
+    let rows: Vec<Vec<(Option<usize>, Block)>> = members
+        .iter()
+        .map(|index| {
+            let blocks = rows.get(index).into_iter().flat_map(|row| &row.blocks);
+            blocks.map(|(other, block)| (number.get(other).copied(), *block)).collect()
+        })
+        .collect();
+    let start = |&i: &usize| [(7.1 * i as f64).sin(), (3.7 * i as f64 + 1.0).sin()];
+    let mut moved: Vec<[f64; 2]> = members.iter().map(start).collect();
     let mut largest = 0.0;
     for _ in 0..ITERATIONS {
-        let next: Vec<[f64; 2]> = members
-            .iter()
-            .map(|&i| {
-                let pairs = weights.of(i).iter().zip(neighbours.of(i));
-                pairs.fold(moved[i], |[x, y], (block, &j)| {
-                    let [wx, wy] = apply(block, moved[j as usize]);
-                    [x - wx, y - wy]
-                })
+        let next = rows.iter().zip(&moved).map(|(row, &here)| {
+            row.iter().fold(here, |[x, y], (other, block)| {
+                let [wx, wy] = apply(block, other.map_or([0.0; 2], |other| moved[other]));
+                [x - wx, y - wy]
             })
-            .collect();
-        let size = |values: &mut dyn Iterator<Item = [f64; 2]>| {
-            values.map(|[x, y]| x * x + y * y).sum::<f64>().sqrt()
-        };
-        let before = size(&mut members.iter().map(|&i| moved[i]));
-        let after = size(&mut next.iter().copied());
-        largest = after / before;
-        members.iter().zip(&next).for_each(|(&i, v)| moved[i] = v.map(|v| v / after));
+        });
+        let next: Vec<[f64; 2]> = next.collect();
+        let size = |values: &[[f64; 2]]| values.iter().map(|[x, y]| x * x + y * y).sum::<f64>().sqrt();
+        let after = size(&next);
+        largest = after / size(&moved);
+        moved = next.into_iter().map(|v| v.map(|v| v / after)).collect();
     }
     inside.min(OF_LIMIT * 2.0 / (SAFETY * largest)).min(1.0)
+}
+
+/// The weights of the neighbours of a particle, which are named by their indices in the whole body.
+struct Row {
+    is_along: bool,
+    blocks: Vec<(usize, Block)>,
+}
+
+impl Row {
+    fn words(self, index: usize) -> Vec<u64> {
+        let block = |(other, block): (usize, Block)| {
+            [other as u64].into_iter().chain(block.into_iter().flatten().map(f64::to_bits))
+        };
+        let head = [index as u64, u64::from(self.is_along), self.blocks.len() as u64];
+        head.into_iter().chain(self.blocks.into_iter().flat_map(block)).collect()
+    }
+
+    fn of_words(mut words: &[u64]) -> BTreeMap<usize, Self> {
+        let mut rows = BTreeMap::new();
+        while let [index, is_along, count, rest @ ..] = words {
+            let (blocks, after) = rest.split_at(5 * *count as usize);
+            let block = |of: &[u64]| {
+                let [a, b, c, d] = std::array::from_fn(|k| f64::from_bits(of[k + 1]));
+                (of[0] as usize, [[a, b], [c, d]])
+            };
+            let blocks = blocks.chunks_exact(5).map(block).collect();
+            rows.insert(*index as usize, Self { is_along: *is_along == 1, blocks });
+            words = after;
+        }
+        rows
+    }
+}
+
+/// Particles, then those that they see, then those that these see, in the order in which they are found.
+fn rings<I: Iterator<Item = usize>>(
+    first: impl Iterator<Item = usize>,
+    seen: impl Fn(usize) -> Option<I>,
+) -> Vec<usize> {
+    let mut members: Vec<usize> = first.collect();
+    let mut known: HashSet<usize> = members.iter().copied().collect();
+    let mut fresh = members.clone();
+    for _ in 0..RINGS {
+        let around: Vec<usize> = fresh.iter().filter_map(|&i| seen(i)).flatten().collect();
+        fresh = around.into_iter().filter(|&j| known.insert(j)).collect();
+        members.extend(&fresh);
+    }
+    members
 }

@@ -1,5 +1,6 @@
 //! Whether two plans, or two files, are the same.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::plan::Plan;
@@ -15,7 +16,7 @@ use crate::ranks::Team;
 pub fn fnv1a(bytes: &[u8]) -> u64 {
     let mut hash = Fnv::default();
     hash.bytes(bytes);
-    hash.0
+    hash.hash
 }
 
 /// A fingerprint of everything in a plan that its run depends on, to distinguish plans: an FNV-1a hash, see [`fnv1a`].
@@ -30,44 +31,72 @@ pub fn digest_of_parts(plan: &Plan, team: &Team) -> u64 {
 
 fn digest_of(plan: &Plan, team: Option<&Team>) -> u64 {
     let mut digest = Fnv::default();
-    // Goes through the ranks in their order, as the particles do.
-    let each = |digest: &mut Fnv, work: &dyn Fn(&mut Fnv)| match team {
-        None => work(digest),
-        Some(team) => {
-            let add = |[hash]: [u64; 1]| {
-                let mut part = Fnv(hash);
-                work(&mut part);
-                [part.0]
-            };
-            [digest.0] = team.chain([digest.0], add);
-        }
-    };
     let Plan { setup, stop, probes, .. } = plan;
     let Setup { body, flock, update, present_radius, roles, changes, cuts, actions, ramp, .. } = setup;
-    let (owned, first) = (body.owned(), body.first());
-    let starts = &flock.neighbours.starts;
-    let bonds = starts[owned.start] as usize..starts[owned.end] as usize;
-    each(&mut digest, &|digest| digest.numbers(&body.reference.x[owned.clone()]));
-    each(&mut digest, &|digest| digest.numbers(&body.reference.y[owned.clone()]));
+    let owned = body.owned();
+    // Goes through the particles of these numbers that belong to this rank, and through the ranks in their order; through those that
+    // come after all others in the whole body at last.
+    let each =
+        |digest: &mut Fnv, numbers: Range<usize>, particle: &dyn Fn(usize) -> usize, work: Work<'_>| {
+            let own = |n: &usize| owned.contains(&particle(*n));
+            let place = |n: usize| body.index_after_all(particle(n));
+            let Some(team) = team else { return numbers.for_each(|n| work(digest, n)) };
+            [digest.hash] = team.chain([digest.hash], |[hash]| {
+                let mut part = Fnv { hash, kept: None };
+                numbers.clone().filter(own).filter(|&n| place(n).is_none()).for_each(|n| work(&mut part, n));
+                [part.hash]
+            });
+            if !body.has_some_after_all() {
+                return;
+            }
+            let mut later: Vec<u8> = Vec::new();
+            for (n, place) in numbers.filter(own).filter_map(|n| Some((n, place(n)?))) {
+                let mut kept = Fnv { kept: Some(Vec::new()), ..Fnv::default() };
+                work(&mut kept, n);
+                let kept = kept.kept.unwrap_or_default();
+                later.extend([place as u64, kept.len() as u64].into_iter().flat_map(u64::to_le_bytes));
+                later.extend(kept);
+            }
+            let all = team.each_bytes(&later);
+            let mut sorted: BTreeMap<u64, &[u8]> = BTreeMap::new();
+            for mut rest in all.iter().map(Vec::as_slice) {
+                while let Some((head, after)) = rest.split_first_chunk::<16>() {
+                    let [place, size] =
+                        [0, 8].map(|k| u64::from_le_bytes(std::array::from_fn(|n| head[k + n])));
+                    let (kept, after) = after.split_at(size as usize);
+                    sorted.insert(place, kept);
+                    rest = after;
+                }
+            }
+            sorted.into_values().for_each(|kept| digest.bytes(kept));
+        };
+    let of_body = |digest: &mut Fnv, work: Work<'_>| each(digest, owned.clone(), &|i| i, work);
+    of_body(&mut digest, &|digest, i| digest.numbers(&[body.reference.x[i]]));
+    of_body(&mut digest, &|digest, i| digest.numbers(&[body.reference.y[i]]));
     digest.text(&format!("{update:?} {present_radius:?} {stop:?} {:?} {cuts:?}", flock.rule));
-    each(&mut digest, &|digest| roles[owned.clone()].iter().for_each(|role| digest.text(role.name())));
+    of_body(&mut digest, &|digest, i| digest.text(roles[i].name()));
     digest.bytes(&0u32.to_le_bytes());
-    let own = bonds.len() as u64;
-    let before = team.map_or(0, |team| team.each([own]).iter().take(team.rank()).map(|[bonds]| bonds).sum());
-    let start = |start: u32| (u64::from(start) - bonds.start as u64 + before) as u32;
-    let ends = &starts[owned.start + 1..owned.end + 1];
-    each(&mut digest, &|digest| ends.iter().for_each(|&end| digest.bytes(&start(end).to_le_bytes())));
-    let seen = |index: u32| (first + index as usize) as u32;
-    let index = &flock.neighbours.index[bonds.clone()];
-    each(&mut digest, &|digest| index.iter().for_each(|&index| digest.bytes(&seen(index).to_le_bytes())));
+    let ends = bonds_until(setup, team);
+    of_body(&mut digest, &|digest, i| digest.bytes(&(ends[i - owned.start] as u32).to_le_bytes()));
+    drop(ends);
+    let neighbours = &flock.neighbours;
+    of_body(&mut digest, &|digest, i| {
+        let seen = neighbours.of(i).iter().map(|&k| body.index(k as usize) as u32);
+        seen.for_each(|index| digest.bytes(&index.to_le_bytes()));
+    });
     let weights = |digest: &mut Fnv, weights: &Weights| match weights {
         Weights::Equal => {}
-        Weights::Scalar(weights) => each(digest, &|digest| digest.numbers(&weights[bonds.clone()])),
-        Weights::Matrix(weights) => each(digest, &|digest| digest.matrices(weights, owned.clone())),
+        Weights::Scalar(weights) => {
+            of_body(digest, &|digest, i| digest.numbers(&weights[neighbours.bonds(i)]));
+        }
+        Weights::Matrix(weights) => {
+            let classes = classes(weights);
+            of_body(digest, &|digest, i| digest.bytes(&classes[weights.class[i] as usize].to_le_bytes()));
+        }
     };
     weights(&mut digest, &flock.weights);
     for component in flock.forces.iter().chain(&flock.rest).flat_map(|points| [&points.x, &points.y]) {
-        each(&mut digest, &|digest| digest.numbers(&component[owned.clone()]));
+        of_body(&mut digest, &|digest, i| digest.numbers(&[component[i]]));
     }
     if let Some(ramp) = ramp {
         digest.text(&format!("ramp {ramp}"));
@@ -82,13 +111,9 @@ fn digest_of(plan: &Plan, team: Option<&Team>) -> u64 {
             motion => (&[][..], format!("{motion:?}")),
         };
         digest.text(&format!("{role:?} {from} {when:?} {motion}"));
-        let is_own = |which: &usize| owned.contains(&particles[*which]);
-        let own = (0..particles.len()).filter(is_own);
-        each(&mut digest, &|digest| {
-            for which in own.clone() {
-                digest.bytes(&((first + particles[which]) as u64).to_le_bytes());
-                digest.numbers(rows.get(which).map_or(&[][..], |row| &row[..]));
-            }
+        each(&mut digest, 0..particles.len(), &|which| particles[which], &|digest, which| {
+            digest.bytes(&(body.index(particles[which]) as u64).to_le_bytes());
+            digest.numbers(rows.get(which).map_or(&[][..], |row| &row[..]));
         });
     }
     for action in actions {
@@ -109,33 +134,70 @@ fn digest_of(plan: &Plan, team: Option<&Team>) -> u64 {
         // The files written so far have these ids, in this order.
         body.rows().for_each(|i| digest.bytes(&(body.id(i) as u64).to_le_bytes()));
     }
-    digest.0
+    digest.hash
 }
 
-struct Fnv(u64);
+/// What is added of a particle.
+type Work<'a> = &'a dyn Fn(&mut Fnv, usize);
+
+/// How many bonds the particles of the whole body have up to each of this rank's own, in the order of the whole.
+fn bonds_until(setup: &Setup, team: Option<&Team>) -> Vec<u64> {
+    let (body, neighbours) = (&setup.body, &setup.flock.neighbours);
+    let bonds = |i: usize| neighbours.of(i).len() as u64;
+    let is_later = |i: &usize| body.index_after_all(*i).is_some();
+    let own: u64 = body.owned().filter(|i| !is_later(i)).map(bonds).sum();
+    let counts = team.map_or_else(|| Vec::from([[own]]), |team| team.each([own]));
+    let mut sum: u64 = counts.iter().take(team.map_or(0, Team::rank)).map(|[bonds]| bonds).sum();
+    let later: Vec<u64> =
+        body.owned().filter(is_later).flat_map(|i| [body.index(i) as u64, bonds(i)]).collect();
+    let later = team.map_or_else(Vec::new, |team| team.gather_all(&later));
+    let mut later: BTreeMap<u64, u64> = later.chunks_exact(2).map(|of| (of[0], of[1])).collect();
+    let mut all: u64 = counts.iter().map(|[bonds]| bonds).sum();
+    for until in later.values_mut() {
+        all += *until;
+        *until = all;
+    }
+    let until = |i: usize| match body.index_after_all(i) {
+        Some(index) => later[&(index as u64)],
+        None => {
+            sum += bonds(i);
+            sum
+        }
+    };
+    body.owned().map(until).collect()
+}
+
+/// A hash of what each class has: parts of a body number the classes each in its own way.
+fn classes(weights: &MatrixWeights) -> Vec<u64> {
+    let hash = |ends: &[u32]| {
+        let mut row = Fnv::default();
+        let blocks = &weights.blocks[ends[0] as usize..ends[1] as usize];
+        blocks.iter().flatten().for_each(|numbers| row.numbers(numbers));
+        row.hash
+    };
+    weights.starts.windows(2).map(hash).collect()
+}
+
+struct Fnv {
+    hash: u64,
+    /// The bytes instead, where they are to be added later.
+    kept: Option<Vec<u8>>,
+}
 
 impl Default for Fnv {
     fn default() -> Self {
-        Self(0xcbf2_9ce4_8422_2325)
+        Self { hash: 0xcbf2_9ce4_8422_2325, kept: None }
     }
 }
 
 impl Fnv {
-    /// Of each of these particles what its class has: parts of a body number the classes each in its own way.
-    fn matrices(&mut self, weights: &MatrixWeights, of: Range<usize>) {
-        let hash = |ends: &[u32]| {
-            let mut row = Fnv::default();
-            let blocks = &weights.blocks[ends[0] as usize..ends[1] as usize];
-            blocks.iter().flatten().for_each(|numbers| row.numbers(numbers));
-            row.0
-        };
-        let classes: Vec<u64> = weights.starts.windows(2).map(hash).collect();
-        weights.class[of].iter().for_each(|&class| self.bytes(&classes[class as usize].to_le_bytes()));
-    }
-
     fn bytes(&mut self, bytes: &[u8]) {
+        if let Some(kept) = &mut self.kept {
+            kept.extend(bytes);
+            return;
+        }
         for &byte in bytes {
-            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
+            self.hash = (self.hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
         }
     }
 

@@ -229,8 +229,13 @@ impl Balancing {
 }
 
 /// Warnings about the stress at the outline of a body: where it is no more than the mean of its cells, and where the cells
-/// cannot bend. `edge` is absent where the outline has no known tractions.
-pub(super) fn cautions(edge: Option<&Edge>, body: &Body, cells: &Cells) -> Vec<String> {
+/// cannot bend. `edge` is absent where the outline has no known tractions; `count` makes of numbers of this part of the body those
+/// of the whole.
+pub(super) fn cautions(
+    edge: Option<&Edge>,
+    (body, cells): (&Body, &Cells),
+    count: impl Fn(usize) -> usize,
+) -> Vec<String> {
     let Some(edge) = edge else {
         let outlined = body.outline.is_some();
         return Vec::from_iter(outlined.then(|| {
@@ -240,10 +245,13 @@ pub(super) fn cautions(edge: Option<&Edge>, body: &Body, cells: &Cells) -> Vec<S
         }));
     };
     let patches = Patches::new(edge, body, cells);
-    let found: Vec<Result<Patch, LeftOut>> = edge.particles.par_iter().map(|&i| patches.of(i)).collect();
+    let owned = body.owned();
+    let own = edge.particles.par_iter().filter(|i| owned.contains(i));
+    let found: Vec<Result<Patch, LeftOut>> = own.map(|&i| patches.of(i)).collect();
     let left_out =
-        |why: LeftOut| found.iter().filter(|patch| patch.as_ref().is_err_and(|e| *e == why)).count();
+        |why: LeftOut| count(found.iter().filter(|patch| patch.as_ref().is_err_and(|e| *e == why)).count());
     let one_row = found.iter().filter(|patch| patch.as_ref().is_ok_and(|patch| patch.is_one_row)).count();
+    let one_row = count(one_row);
     let (interface, few) = (left_out(LeftOut::Interface), left_out(LeftOut::Few));
     let mut cautions = Vec::new();
     if interface > 0 {

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
 use crate::engine::setup::RoleChange;
-use crate::flock::body::{Body, BodyError, Cut, Outlay};
+use crate::flock::body::{Body, BodyError, Cut, Outlay, OutlineParticles};
 use crate::flock::lattice::Site;
 use crate::flock::motion::Motion;
 use crate::flock::neighbourhood::{Neighbourhood, NeighbourhoodError, Neighbours};
@@ -41,6 +41,9 @@ pub struct Layout {
     pub partition: Option<Partition>,
     /// The boundary of the cells of the whole body, where this is a part of it and the boundary is needed.
     pub boundary: Option<Arc<Boundary>>,
+    /// Whether the body, of which this is a part, is flat on its left, right, bottom and top: several particles of its outline stand
+    /// there.
+    pub flat: Option<[bool; 4]>,
 }
 
 impl Layout {
@@ -52,21 +55,14 @@ impl Layout {
         let fitted = fitted(scene)?;
         let layout = match fitted {
             Some((fitted, partition)) if !is_all_whole(&fitted.cells) => {
-                let Fitted { body, mut cells } = fitted;
-                cells.inclusions = scene.inclusions.iter().map(|part| part.material).collect();
-                require_resolved(scene, &body)?;
-                require_cell_neighbours(scene)?;
-                let neighbours = match &scene.material {
-                    Some(elastic) => cells.neighbours(body.count(), elastic),
-                    None => cells.cell_neighbours(body.count()),
-                };
-                let outline = Some(partition.outline().clone());
-                let partition = Some(partition).filter(|_| !scene.inclusions.is_empty());
-                Self { body, neighbours, cells: Some(cells), outline, partition, boundary: None }
+                Self::of_cut_cells(scene, fitted, partition)?
             }
             of_lattice => {
                 let body = body_of(scene).map_err(|error| refuse_body(scene, &error))?;
-                Self::of_whole_cells(scene, body, of_lattice, None)?
+                let is_same = |(fitted, _): &(Fitted, Partition)| fitted.body.sites == body.0.sites;
+                let kept = of_lattice.filter(is_same);
+                let kept = kept.map(|(fitted, partition)| (fitted.body.outline, partition));
+                Self::of_whole_cells(scene, body, kept, None)?
             }
         };
         if !matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. }) {
@@ -76,31 +72,60 @@ impl Layout {
         Ok(layout)
     }
 
-    /// A part of a body of whole cells, or of particles alone, which stand on a lattice.
+    /// A body, or a part of one, whose cells an outline has cut.
+    pub(super) fn of_cut_cells(
+        scene: &Scene,
+        Fitted { body, mut cells }: Fitted,
+        partition: Partition,
+    ) -> Result<Self, SceneError> {
+        require_in_range(scene)?;
+        cells.inclusions = scene.inclusions.iter().map(|part| part.material).collect();
+        require_resolved(scene, &body)?;
+        require_cell_neighbours(scene)?;
+        let mut neighbours = match &scene.material {
+            Some(elastic) => cells.neighbours(body.count(), elastic),
+            None => cells.cell_neighbours(body.count()),
+        };
+        if body.part.is_some() {
+            // In the order of the whole body.
+            let listed = |i: usize| {
+                let mut seen = neighbours.of(i).to_vec();
+                seen.sort_by_key(|&k| body.index(k as usize));
+                seen
+            };
+            neighbours = Neighbours::from_lists((0..body.count()).map(listed));
+        }
+        let outline = Some(partition.outline().clone());
+        let partition = Some(partition).filter(|_| !scene.inclusions.is_empty());
+        Ok(Self { body, neighbours, cells: Some(cells), outline, partition, boundary: None, flat: None })
+    }
+
+    /// A part of a body of whole cells, or of particles alone, which stand on a lattice; where it keeps its outline, with that.
     ///
     /// # Errors
     /// As [`Layout::new`].
     pub(super) fn of_part(
         scene: &Scene,
         body: (Body, Neighbours),
+        kept: Option<(Option<Arc<OutlineParticles>>, Partition)>,
         boundary: Option<Arc<Boundary>>,
     ) -> Result<Self, SceneError> {
         require_in_range(scene)?;
-        Self::of_whole_cells(scene, body, None, boundary)
+        Self::of_whole_cells(scene, body, kept, boundary)
     }
 
     /// A body of whole cells, or of particles alone; one that fits its outline as it is keeps that.
     fn of_whole_cells(
         scene: &Scene,
         (mut body, neighbours): (Body, Neighbours),
-        fitted: Option<(Fitted, Partition)>,
+        kept: Option<(Option<Arc<OutlineParticles>>, Partition)>,
         boundary: Option<Arc<Boundary>>,
     ) -> Result<Self, SceneError> {
         require_resolved(scene, &body)?;
         let mut cells = scene.material.as_ref().map(|_| Cells::of_body(&body));
-        let (outline, partition) = match (&scene.body, &cells, fitted) {
-            (_, _, Some((fitted, partition))) if fitted.body.sites == body.sites => {
-                body.outline = fitted.body.outline;
+        let (outline, partition) = match (&scene.body, &cells, kept) {
+            (_, _, Some((outline, partition))) => {
+                body.outline = outline;
                 (Some(partition.outline().clone()), Some(partition))
             }
             (BodySource::Cut(Cut::Shape(shape)), ..) => match Outline::of_shape(shape) {
@@ -127,7 +152,7 @@ impl Layout {
             cells.divide(&body.reference, regions, |p| partition.region(p));
             cells.inclusions = scene.inclusions.iter().map(|part| part.material).collect();
         }
-        Ok(Self { body, neighbours, cells, outline, partition, boundary })
+        Ok(Self { body, neighbours, cells, outline, partition, boundary, flat: None })
     }
 
     /// Role changes in the order in which they are written. Leaders led by a reference
@@ -352,8 +377,8 @@ impl Layout {
     fn outermost(&self, side: Side) -> Vec<usize> {
         let within = |depth: f64| Region::Edge { side, depth }.pick(&self.body, &self.neighbours);
         if self.body.outline.is_some() {
-            let flat = within(1e-6 * self.body.lattice.spacing());
-            if flat.len() > 1 {
+            let flat = within(FLAT * self.body.lattice.spacing());
+            if self.flat.map_or(flat.len() > 1, |flat| flat[side as usize]) {
                 return flat;
             }
         }
@@ -448,6 +473,9 @@ pub fn held_components(changes: &[RoleChange], body: &Body, step: f64) -> Vec<He
     };
     components.into_iter().map(component).collect()
 }
+
+/// Depth within which particles stand on a flat side \[spacings\].
+pub(super) const FLAT: f64 = 1e-6;
 
 /// Least spacing over the distance of two doubles at the body's largest coordinate: six digits of a
 /// displacement of one spacing.
@@ -576,15 +604,23 @@ fn check_pieces(scene: &Scene, key: &str, region: &SceneRegion, outline: &Outlin
 /// # Errors
 /// Names what in the shape has no outline that cells can follow.
 fn fitted(scene: &Scene) -> Result<Option<(Fitted, Partition)>, SceneError> {
-    let (true, BodySource::Cut(Cut::Shape(shape))) = (scene.is_fitted, &scene.body) else { return Ok(None) };
-    let outline = Outline::of_shape(shape).map_err(|error| refuse_outline(scene, &error))?;
-    let partition = divided(scene, &outline)?;
+    let Some(partition) = to_be_fitted(scene)? else { return Ok(None) };
     let fitted = fit_regions(&scene.lattice, &partition).map_err(|error| refuse_fit(scene, &error))?;
     Ok(Some((fitted, partition)))
 }
 
+/// The outline that the body is to be fitted to, where the scene asks for that.
+///
+/// # Errors
+/// Names what in the shape has no outline that cells can follow.
+pub(super) fn to_be_fitted(scene: &Scene) -> Result<Option<Partition>, SceneError> {
+    let (true, BodySource::Cut(Cut::Shape(shape))) = (scene.is_fitted, &scene.body) else { return Ok(None) };
+    let outline = Outline::of_shape(shape).map_err(|error| refuse_outline(scene, &error))?;
+    divided(scene, &outline).map(Some)
+}
+
 /// Names the part of the body that is too narrow, or too large, for the lattice.
-fn refuse_fit(scene: &Scene, error: &FitError) -> SceneError {
+pub(super) fn refuse_fit(scene: &Scene, error: &FitError) -> SceneError {
     let help = match error {
         FitError::TooLarge { .. } => "use a wider spacing or a smaller shape",
         _ => "use a smaller spacing, leave the detail out, or set body.outline = \"lattice\"",

@@ -3,9 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 use super::edge_stress::{self, recovered};
+use super::pieces::CellNumbers;
 use crate::engine::Engine;
 use crate::engine::forces::{Forces, LoadResultant, Reaction};
 use crate::engine::path::{Path, Work};
+use crate::flock::body::Body;
 use crate::flock::rules::{Mean, Rotation};
 use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
@@ -117,53 +119,67 @@ impl Stresses {
         Self::of(engine, elastic, &engine.displacements(), &pairs.collect::<Vec<_>>())
     }
 
-    /// Of the whole body, if each part knows its own: the first of several.
+    /// Of the whole body, if each part knows its own.
     fn peak(&self, engine: &Engine, cells: &Cells) -> Option<Peak> {
-        let own = self.own_peak(engine, cells);
-        let Some(team) = engine.parted() else { return own };
-        let counts = team.each([engine.owned_cells().len() as u64]);
-        let before = counts.into_iter().take(team.rank()).map(|[count]| count as usize).sum::<usize>();
-        let number = |mut peak: Peak| {
-            peak.cell = peak.cell.map(|cell| before + cell - engine.owned_cells().start);
-            peak
-        };
-        let own = own.map(number);
-        let ids: Vec<u64> = own.iter().flat_map(|peak| &peak.particles).map(|&id| id as u64).collect();
-        let words = own.map_or([0; 5], |peak| {
-            let [x, y] = peak.place.map(f64::to_bits);
-            [ids.len() as u64, peak.von_mises.to_bits(), peak.cell.map_or(0, |cell| cell as u64), x, y]
+        let body = engine.body();
+        let numbers = CellNumbers::of(body, cells, engine.parted());
+        let cell = self.highest_cell(engine).map(|(cell, von_mises)| {
+            let corners = cells.of(cell);
+            let places: Vectors = corners.iter().map(|&i| body.reference.get(i as usize)).collect();
+            let particles = corners.iter().map(|&i| body.id(i as usize)).collect();
+            Peak { von_mises, cell: Some(numbers.number(cell) + 1), place: places.middle(), particles }
         });
-        let mut ids = team.gather_all(&ids).into_iter().map(|id| id as usize);
-        let all = team.each(words).into_iter().map(|[count, von_mises, cell, x, y]| Peak {
-            von_mises: f64::from_bits(von_mises),
-            cell: (cell > 0).then_some(cell as usize),
-            place: [x, y].map(f64::from_bits),
-            particles: ids.by_ref().take(count as usize).collect(),
+        let edge = self.highest_recovered(body).map(|(particle, von_mises)| {
+            let place = body.reference.get(particle);
+            Peak { von_mises, cell: None, place, particles: vec![body.id(particle)] }
         });
-        all.filter(|peak| !peak.particles.is_empty())
-            .reduce(|best, next| if next.von_mises > best.von_mises { next } else { best })
+        let [cell, edge] = [cell, edge].map(|own| highest_of_parts(engine, own));
+        // Where no cell has a stress nothing is recovered.
+        let cell = cell?;
+        Some(edge.filter(|edge| edge.von_mises > cell.von_mises).unwrap_or(cell))
     }
 
-    fn own_peak(&self, engine: &Engine, cells: &Cells) -> Option<Peak> {
-        let own = engine.owned_cells().map(|cell| (cell, &self.cells[cell]));
-        let finite = own.filter(|(_, stress)| stress.von_mises.is_finite());
-        // The first of several.
-        let higher = |best: Option<(usize, f64)>, (cell, stress): (usize, &StressState)| match best {
-            Some((_, most)) if most >= stress.von_mises => best,
-            _ => Some((cell, stress.von_mises)),
-        };
-        let (cell, von_mises) = finite.fold(None, higher)?;
-        let known = self.recovered.iter().filter_map(|&i| Some((i, self.particles[i]?.von_mises)));
-        let at_edge = known.reduce(|best, next| if next.1 > best.1 { next } else { best });
-        if let Some((particle, von_mises)) = at_edge.filter(|(_, at_edge)| *at_edge > von_mises) {
-            let place = engine.body().reference.get(particle);
-            return Some(Peak { von_mises, cell: None, place, particles: vec![engine.body().id(particle)] });
-        }
-        let corners = cells.of(cell);
-        let places: Vectors = corners.iter().map(|&i| engine.body().reference.get(i as usize)).collect();
-        let particles = corners.iter().map(|&i| engine.body().id(i as usize)).collect();
-        Some(Peak { von_mises, cell: Some(cell + 1), place: places.middle(), particles })
+    /// The first of several.
+    fn highest_cell(&self, engine: &Engine) -> Option<(usize, f64)> {
+        let own = engine.owned_cells().map(|cell| (cell, self.cells[cell].von_mises));
+        let finite = own.filter(|(_, von_mises)| von_mises.is_finite());
+        finite.reduce(|best, next| if next.1 > best.1 { next } else { best })
     }
+
+    /// The same of particles.
+    fn highest_recovered(&self, body: &Body) -> Option<(usize, f64)> {
+        let owned = body.owned();
+        let own = self.recovered.iter().filter(|i| owned.contains(i));
+        let known = own.filter_map(|&i| Some((i, self.particles[i]?.von_mises)));
+        let is_first = |a: usize, b: usize| body.index(a) < body.index(b);
+        known.reduce(|best, next| {
+            let is_higher = next.1 > best.1 || (next.1 == best.1 && is_first(next.0, best.0));
+            if is_higher { next } else { best }
+        })
+    }
+}
+
+/// The highest of the peaks of all parts, if there is one: of several the first cell, or particle.
+fn highest_of_parts(engine: &Engine, own: Option<Peak>) -> Option<Peak> {
+    let Some(team) = engine.parted() else { return own };
+    let ids: Vec<u64> = own.iter().flat_map(|peak| &peak.particles).map(|&id| id as u64).collect();
+    let words = own.map_or([0; 5], |peak| {
+        let [x, y] = peak.place.map(f64::to_bits);
+        [ids.len() as u64, peak.von_mises.to_bits(), peak.cell.map_or(0, |cell| cell as u64), x, y]
+    });
+    let mut ids = team.gather_all(&ids).into_iter().map(|id| id as usize);
+    let all = team.each(words).into_iter().map(|[count, von_mises, cell, x, y]| Peak {
+        von_mises: f64::from_bits(von_mises),
+        cell: (cell > 0).then_some(cell as usize),
+        place: [x, y].map(f64::from_bits),
+        particles: ids.by_ref().take(count as usize).collect(),
+    });
+    let is_first = |a: &Peak, b: &Peak| (a.cell, &a.particles) < (b.cell, &b.particles);
+    all.filter(|peak| !peak.particles.is_empty()).reduce(|best, next| {
+        let is_higher =
+            next.von_mises > best.von_mises || (next.von_mises == best.von_mises && is_first(&next, &best));
+        if is_higher { next } else { best }
+    })
 }
 
 /// The stress of each cell, NaN in those that are torn.
@@ -208,7 +224,7 @@ impl Mechanics {
             work_done: engine.path().map(Path::done),
             unbalanced: forces.as_ref().map(|forces| forces.largest_left(engine)),
             largest_von_mises: stresses.peak(engine, cells),
-            largest_strain: finite(&mut stresses.cells[own.clone()].iter().map(StressState::largest_strain)),
+            largest_strain: finite(&mut own.clone().map(|cell| stresses.cells[cell].largest_strain())),
             largest_turn: finite(&mut stress::turns(cells, own, &u).map(f64::abs)),
         })
     }
@@ -229,7 +245,9 @@ impl Mechanics {
         }
         cautions.extend(self.missed_work());
         if let Some(cells) = engine.cells().filter(|_| is_material) {
-            cautions.extend(edge_stress::cautions(engine.free_edge(), engine.body(), cells));
+            cautions.extend(edge_stress::cautions(engine.free_edge(), (engine.body(), cells), |own| {
+                engine.count_of_parts(own)
+            }));
         }
         cautions
     }
@@ -255,12 +273,17 @@ fn strain_energy(engine: &Engine, elastic: &Elastic, forces: Option<&Forces>, u:
         // Without the sign of a zero.
         return 0.0 - 0.5 * forces.work_of(&forces.internal, engine);
     }
-    let sum = |own: &mut dyn Iterator<Item = f64>| engine.sum_of_parts([-0.0], own.map(|own| [own]))[0];
-    let over = Over { cells: engine.owned_cells(), particles: engine.body().owned(), sum: &sum };
-    let rotation = rotation(engine);
-    let of_cells =
-        engine.cells().map(|cells| stress::strain_energy_over(cells, elastic, (u, rotation), &over));
-    of_cells.and_then(Result::ok).unwrap_or(f64::NAN)
+    let Some(cells) = engine.cells() else { return f64::NAN };
+    let (body, whole) = (engine.body(), cells.count_whole());
+    let sum = |own: &mut dyn Iterator<Item = (usize, f64)>| {
+        engine.sum_over([-0.0], own.map(|(particle, own)| (particle, [own])))[0]
+    };
+    let sum_of_cells = |own: &mut dyn Iterator<Item = (usize, f64)>| {
+        engine.sum_of_parts([-0.0], own.map(|(cell, own)| (body.cell_after_all(cell, whole), [own])))[0]
+    };
+    let over =
+        Over { cells: cells.owned(body), particles: body.owned(), sum_of_cells: &sum_of_cells, sum: &sum };
+    stress::strain_energy_over(cells, elastic, (u, rotation(engine)), &over).unwrap_or(f64::NAN)
 }
 
 /// Which turns of a cell are no strain.

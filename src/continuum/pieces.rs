@@ -1,6 +1,6 @@
 //! The pieces that a body falls into, where each rank has a part of it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::ops::Range;
 
 use crate::flock::body::{Body, BodyError, Part};
@@ -20,31 +20,33 @@ struct Pieces {
 }
 
 impl Pieces {
-    /// `labels` are the same for those that hang together here, of which the first one that stands here has the number `first`
-    /// in the whole body; those `owned` that are `members` belong to this rank, and those in `beyond` to others: where the pieces of
-    /// two ranks meet, at least one of both must name one that the other owns.
+    /// `labels` are the same for those that hang together here; `number` says which each is in the whole body. Those that are
+    /// `owned` belong to this rank, and those in `beyond` to others: where the pieces of two ranks meet, at least one of both must
+    /// name one that the other owns.
     fn among(
         team: &Team,
         labels: &[u32],
-        (first, owned): (usize, Range<usize>),
-        members: impl Fn(usize) -> bool,
+        number: impl Fn(usize) -> usize,
+        owned: impl Iterator<Item = usize>,
         beyond: impl Iterator<Item = usize>,
     ) -> Self {
         let rank = team.rank() as u64;
         let labelled: Vec<u64> =
-            beyond.flat_map(|i| [(first + i) as u64, rank, u64::from(labels[i])]).collect();
+            beyond.flat_map(|i| [number(i) as u64, rank, u64::from(labels[i])]).collect();
         let all = team.gather_all(&labelled);
-        let here = |number: u64| (number as usize).checked_sub(first).filter(|i| owned.contains(i));
+        let named: HashSet<u64> = all.chunks_exact(3).map(|of| of[0]).collect();
+        let (mut here, mut pieces): (HashMap<u64, u32>, BTreeMap<u32, u64>) = Default::default();
+        for (number, label) in owned.map(|i| (number(i) as u64, labels[i])) {
+            // The first of each piece of this rank.
+            let first = pieces.entry(label).or_insert(number);
+            *first = number.min(*first);
+            here.extend(named.contains(&number).then_some((number, label)));
+        }
         let pairs: BTreeSet<[u64; 4]> = all
             .chunks_exact(3)
-            .filter_map(|of| Some([of[1], of[2], rank, u64::from(labels[here(of[0])?])]))
+            .filter_map(|of| Some([of[1], of[2], rank, u64::from(*here.get(&of[0])?)]))
             .collect();
         let pairs = team.gather_all(&pairs.into_iter().flatten().collect::<Vec<_>>());
-        // The first of each piece of this rank.
-        let mut pieces: BTreeMap<u32, u64> = BTreeMap::new();
-        for i in owned.filter(|&i| members(i)) {
-            pieces.entry(labels[i]).or_insert((first + i) as u64);
-        }
         let own: Vec<u64> =
             pieces.into_iter().flat_map(|(label, number)| [rank, u64::from(label), number]).collect();
         let pieces = team.gather_all(&own);
@@ -77,7 +79,7 @@ impl Pieces {
 /// # Errors
 /// On all ranks alike.
 pub fn require_connected(body: &Body, neighbours: &Neighbours, team: &Team) -> Result<(), BodyError> {
-    let Some(Part { first, owned, exact, .. }) = &body.part else {
+    let Some(Part { owned, exact, .. }) = &body.part else {
         return body.require_connected(neighbours);
     };
     let mut sets = DisjointSets::new(body.count());
@@ -90,7 +92,8 @@ pub fn require_connected(body: &Body, neighbours: &Neighbours, team: &Team) -> R
     let end = owned.clone().map(sees).max().map_or(owned.end, |last| (last + 1).clamp(owned.end, exact.end));
     let members = |i: usize| !body.is_frame[i];
     let beyond = (owned.end..end).filter(|&i| members(i));
-    let pieces = Pieces::among(team, &sets.labels(), (*first, owned.clone()), members, beyond);
+    let own = owned.clone().filter(|&i| members(i));
+    let pieces = Pieces::among(team, &sets.labels(), |i| body.index(i), own, beyond);
     match pieces.firsts[..] {
         [first, second, ..] => {
             let [first, second] = [first, second].map(|index| index as usize + 1);
@@ -100,37 +103,65 @@ pub fn require_connected(body: &Body, neighbours: &Neighbours, team: &Team) -> R
     }
 }
 
-/// The cells of a part among those of the whole body: the number of the first one that stands here, and those that belong to this
-/// part, as their first corners do.
-pub fn owned_cells(body: &Body, cells: &Cells, team: &Team) -> (usize, Range<usize>) {
-    let owned = body.owned();
-    let owned = cells.before(owned.start)..cells.before(owned.end);
-    let counts = team.each([owned.len() as u64]);
-    let before: u64 = counts.iter().take(team.rank()).map(|[count]| count).sum();
-    (before as usize - owned.start, owned)
+/// Which cells of the whole body those of a part are.
+pub struct CellNumbers<'a> {
+    body: &'a Body,
+    /// Those that belong to this part.
+    pub owned: Vec<Range<usize>>,
+    /// How many of those that stand here are whole.
+    whole: usize,
+    /// Whole cells of the body before those that belong to this part, and in all.
+    before: usize,
+    total: usize,
+}
+
+impl<'a> CellNumbers<'a> {
+    /// Found by all ranks that have parts of the body.
+    pub fn of(body: &'a Body, cells: &Cells, team: Option<&Team>) -> Self {
+        let (owned, whole) = (cells.owned(body), cells.count_whole());
+        let counts = match team {
+            Some(team) => team.each([owned[0].len() as u64]),
+            None => Vec::from([[whole as u64]]),
+        };
+        let sum = |counts: &[[u64; 1]]| counts.iter().map(|[count]| *count as usize).sum::<usize>();
+        let before = sum(&counts[..team.map_or(0, Team::rank)]);
+        Self { body, owned, whole, before, total: sum(&counts) }
+    }
+
+    /// The number of a cell in the whole body.
+    pub fn number(&self, cell: usize) -> usize {
+        match self.body.cell_after_all(cell, self.whole) {
+            Some(number) => self.total + number,
+            None => self.before + cell - self.owned[0].start,
+        }
+    }
 }
 
 /// How the parts of a body in which cells are rigid together are linked, found by all ranks; and which part each cell belongs to
 /// that has a corner that this rank owns, or is a neighbour of one that it owns, shape \[cells\].
 pub fn linkage(body: &Body, (cells, incidence): (&Cells, &Incidence), team: &Team) -> (Vec<usize>, Linkage) {
     let labels = joined_cells(cells, incidence);
-    let (first, owned) = owned_cells(body, cells, team);
-    let corners = owned.clone().flat_map(|cell| cells.of(cell)).map(|&i| i as usize).chain(body.owned());
+    let numbers = CellNumbers::of(body, cells, Some(team));
+    let owned = || numbers.owned.iter().cloned().flatten();
+    let is_owned = |cell: usize| numbers.owned.iter().any(|stretch| stretch.contains(&cell));
+    let corners = owned().flat_map(|cell| cells.of(cell)).map(|&i| i as usize).chain(body.owned());
     let around = corners.collect::<BTreeSet<_>>().into_iter().flat_map(|i| incidence.of(i));
-    let beyond: BTreeSet<usize> = around.map(|&cell| cell as usize).filter(|c| !owned.contains(c)).collect();
-    let Pieces { firsts, of_label } =
-        Pieces::among(team, &labels, (first, owned.clone()), |_| true, beyond.into_iter());
+    let beyond: BTreeSet<usize> = around.map(|&cell| cell as usize).filter(|&c| !is_owned(c)).collect();
+    let number = |cell: usize| numbers.number(cell);
+    let Pieces { firsts, of_label } = Pieces::among(team, &labels, number, owned(), beyond.into_iter());
     let part: Vec<usize> = labels.iter().map(|l| of_label.get(l).copied().unwrap_or(usize::MAX)).collect();
-    let whole = |i: u32| (body.first() + i as usize) as u64;
-    let own = firsts.iter().filter_map(|&number| (number as usize).checked_sub(first));
-    let own: Vec<u64> = own.filter(|c| owned.contains(c)).map(|cell| whole(cells.of(cell)[0])).collect();
-    let corners: Vec<usize> = team.gather_all(&own).into_iter().map(|index| index as usize).collect();
+    let corner = |cell: usize| [number(cell) as u64, body.index(cells.of(cell)[0] as usize) as u64];
+    let is_first = |&[number, _]: &[u64; 2]| firsts.binary_search(&number).is_ok();
+    let own: Vec<u64> = owned().map(corner).filter(is_first).flatten().collect();
+    let corners: BTreeMap<u64, usize> =
+        team.gather_all(&own).chunks_exact(2).map(|of| (of[0], of[1] as usize)).collect();
+    let corners: Vec<usize> = corners.into_values().collect();
     if corners.len() <= 1 {
         return (part, Linkage { corners, hinges: Vec::new() });
     }
     let hinge = |i: usize| {
         let parts = incidence.of(i).iter().map(|&cell| part[cell as usize]);
-        Hinge::of((body.first() + i, body.reference.get(i)), parts)
+        Hinge::of((body.index(i), body.reference.get(i)), parts)
     };
     let words = |Hinge { particle, place: [x, y], parts }: Hinge| {
         let head = [particle as u64, x.to_bits(), y.to_bits(), parts.len() as u64];
@@ -146,6 +177,7 @@ pub fn linkage(body: &Body, (cells, incidence): (&Cells, &Incidence), team: &Tea
         hinges.push(Hinge { particle: *particle as usize, place, parts });
         rest = after;
     }
+    hinges.sort_by_key(|hinge| hinge.particle);
     (part, Linkage { corners, hinges })
 }
 
@@ -167,7 +199,7 @@ pub fn require_held(
     let mut holds = vec![Hold::NONE; groups.len()];
     for i in body.owned() {
         if let Some(group) = group_of(i) {
-            holds[group] = holds[group].with(body.first() + i, held[i]);
+            holds[group] = holds[group].with(body.index(i), held[i]);
         }
     }
     let words: Vec<u64> =
@@ -183,10 +215,13 @@ pub fn require_held(
     let gathered = |own: &mut dyn Iterator<Item = (usize, u64)>| -> Vec<([f64; 2], u64)> {
         let words = |(i, number): (usize, u64)| {
             let [x, y] = body.reference.get(i).map(f64::to_bits);
-            [x, y, number]
+            [x, y, number, body.index(i) as u64]
         };
         let all = team.gather_all(&own.flat_map(words).collect::<Vec<_>>());
-        all.chunks_exact(3).map(|of| ([f64::from_bits(of[0]), f64::from_bits(of[1])], of[2])).collect()
+        let mut all: Vec<_> = all.chunks_exact(4).collect();
+        all.sort_by_key(|of| of[3]);
+        let place = |of: &[u64]| [0, 1].map(|k| f64::from_bits(of[k]));
+        all.into_iter().map(|of| (place(of), of[2])).collect()
     };
     let members = |group: usize| -> Vec<HeldPlace> {
         let own = body.owned().filter(|&i| held[i] != [false; 2] && group_of(i) == Some(group));

@@ -1,13 +1,17 @@
 //! Displacement and stress at the places that a scene names.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::mechanics::Stresses;
+use super::pieces::CellNumbers;
 use crate::engine::Engine;
-use crate::flock::vectors::Vectors;
+use crate::flock::body::Body;
 use crate::material::cells::Cells;
 use crate::material::place::Around;
 use crate::material::stress::StressState;
+use crate::ranks::Team;
 use crate::scene::{Scene, SceneError};
 
 /// Displacement and stress at a place of a body.
@@ -23,35 +27,64 @@ pub struct AtPlace {
     pub von_mises: f64,
 }
 
-/// The particles around each place of `record.places`.
+/// The particles around each place of `record.places`; of those that another rank has, where each has a part of the body, none.
 ///
 /// # Errors
-/// Names a place that is not of the body, and a body without cells.
-pub fn around(scene: &Scene, cells: Option<&Cells>, reference: &Vectors) -> Result<Vec<Around>, SceneError> {
+/// Names a place that is not of the body, and a body without cells; on all ranks alike.
+pub fn around(
+    scene: &Scene,
+    (body, cells): (&Body, Option<&Cells>),
+    team: Option<&Team>,
+) -> Result<Vec<Option<Around>>, SceneError> {
     // An outline of chords may be that far from the shape.
     let reach = scene.lattice.spacing();
+    let numbers = cells.map(|cells| CellNumbers::of(body, cells, team));
     let of = |(k, &place): (usize, &[f64; 2])| {
         let key = format!("record.places[{k}]");
-        let Some(cells) = cells else {
+        let (Some(cells), Some(numbers)) = (cells, &numbers) else {
             let message = "there are no cells to find a place in: the scene has no material";
             return Err(scene.refuse(&key, message, "add [material], or name particles in record.probes"));
         };
+        let own = numbers.owned.iter().cloned().flatten();
+        let own = Around::nearest(place, (cells, own), &body.reference);
+        let found = own.as_ref().map_or([f64::INFINITY.to_bits(), u64::MAX], |(_, cell, apart)| {
+            [apart.to_bits(), numbers.number(*cell) as u64]
+        });
+        let ranks = team.map_or_else(|| Vec::from([found]), |team| team.each(found));
+        // The first of several cells, whose rank has it.
+        let order = |a: &[u64; 2], b: &[u64; 2]| {
+            f64::from_bits(a[0]).total_cmp(&f64::from_bits(b[0])).then(a[1].cmp(&b[1]))
+        };
+        let nearest = ranks.into_iter().min_by(order).filter(|of| f64::from_bits(of[0]) <= reach);
         let help = "give a place of the undeformed body";
-        Around::of(place, cells, reference, reach)
-            .ok_or_else(|| scene.refuse(&key, "is more than a spacing away from the body", help))
+        let nearest =
+            nearest.ok_or_else(|| scene.refuse(&key, "is more than a spacing away from the body", help))?;
+        Ok(own.filter(|_| found == nearest).map(|(around, ..)| around))
     };
     scene.record.places.iter().enumerate().map(of).collect()
 }
 
-/// Displacement and stress at each place of `record.places`, under the stresses at present.
+/// Displacement and stress at each place of `record.places`, under the stresses at present; on all ranks that share the body.
 pub fn at_places(scene: &Scene, engine: &Engine, stresses: &Stresses) -> Vec<AtPlace> {
-    let around = around(scene, engine.cells(), &engine.body().reference).unwrap_or_default();
-    let at = |(&place, around): (&[f64; 2], Around)| {
-        let displacement = around.mean(|i| Some(engine.displacement(i))).unwrap_or_default();
+    let team = engine.parted();
+    let around = around(scene, (engine.body(), engine.cells()), team).unwrap_or_default();
+    let at = |(k, around): (usize, Option<Around>)| {
+        let around = around?;
+        let [ux, uy] = around.mean(|i| Some(engine.displacement(i))).unwrap_or_default();
         let of = |StressState { components: [xx, yy, xy], von_mises, .. }| [xx, yy, xy, von_mises];
         let found = around.mean(|i| stresses.particles[i].map(of));
         let [xx, yy, xy, von_mises] = found.unwrap_or([f64::NAN; 4]);
-        AtPlace { place, displacement, stress: [xx, yy, xy], von_mises }
+        Some((k, [ux, uy, xx, yy, xy, von_mises].map(f64::to_bits)))
     };
-    scene.record.places.iter().zip(around).map(at).collect()
+    let own = around.into_iter().enumerate().filter_map(at);
+    let own: Vec<u64> = own.flat_map(|(k, words)| [k as u64].into_iter().chain(words)).collect();
+    let all = team.map_or_else(|| own.clone(), |team| team.gather_all(&own));
+    let of_words = |words: &[u64]| {
+        let k = words[0] as usize;
+        let [ux, uy, xx, yy, xy, von_mises] = std::array::from_fn(|of| f64::from_bits(words[of + 1]));
+        let place = scene.record.places[k];
+        (k, AtPlace { place, displacement: [ux, uy], stress: [xx, yy, xy], von_mises })
+    };
+    let all: BTreeMap<usize, AtPlace> = all.chunks_exact(7).map(of_words).collect();
+    all.into_values().collect()
 }

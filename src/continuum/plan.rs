@@ -101,6 +101,9 @@ impl Plan {
         }
         let mut plan = agreed(scene, team, Self::of_roles(scene, layout, changes))?;
         plan.require_held_together(scene, team)?;
+        let Setup { body, flock, .. } = &plan.setup;
+        plan.setup.update = update(scene, body, &flock.neighbours, &flock.weights, Some(team));
+        places::around(scene, (&plan.setup.body, plan.setup.cells.as_ref()), Some(team))?;
         if plan.setup.flock.bonds.is_some() && u32::try_from(plan.setup.body.total()).is_err() {
             let message = "broken bonds are known by particles up to number 4,294,967,295";
             return Err(scene.refuse("body.shape", message, "use a wider spacing or a smaller shape"));
@@ -149,7 +152,10 @@ impl Plan {
     fn of_roles(scene: &Scene, layout: Layout, changes: Vec<RoleChange>) -> Result<Self, SceneError> {
         let following = Following::new(scene, &layout, &changes)?;
         let probes = probes(scene, &layout.body)?;
-        places::around(scene, layout.cells.as_ref(), &layout.body.reference)?;
+        // For all parts to find out.
+        if layout.body.part.is_none() {
+            places::around(scene, (&layout.body, layout.cells.as_ref()), None)?;
+        }
         require_listable(scene, &layout.body)?;
         let actions = actions(scene, &layout, &changes)?;
         let Layout { body, neighbours, cells, outline, .. } = layout;
@@ -225,7 +231,7 @@ impl Following {
         if let Weights::Matrix(weights) = &mut weights {
             hold_components(weights, &held_components(changes, body, 0.0));
         }
-        let update = update(scene, body, neighbours, &weights);
+        let update = update(scene, body, neighbours, &weights, None);
         Ok(Self { weights, forces, update, loads, free_edge })
     }
 
@@ -331,7 +337,10 @@ fn ever_follow(body: &Body, changes: &[RoleChange]) -> Vec<bool> {
 fn free_edge(scene: &Scene, layout: &Layout, loads: &[Load], held: &[[bool; 2]]) -> Option<FreeEdge> {
     let (elastic, outline) = (scene.material.as_ref()?, layout.outline.as_ref()?);
     let is_ruled = matches!(scene.mean, Mean::Material { .. }) && layout.body.outline.is_some();
-    is_ruled.then(|| FreeEdge::new(outline.clone(), (loads.to_vec(), elastic.thickness()), held.to_vec()))
+    let sides = layout.boundary.as_ref().map(|boundary| boundary.ends.len());
+    is_ruled.then(|| {
+        FreeEdge::new((outline.clone(), sides), (loads.to_vec(), elastic.thickness()), held.to_vec())
+    })
 }
 
 /// Components that are led or clamped from the start, shape \[count\]\[x, y\].
@@ -387,14 +396,21 @@ fn hold_components(weights: &mut MatrixWeights, held: &[HeldComponent]) {
 /// undiminished it does not settle, 0.95 settles after growing tenfold, 0.75 at once.
 const OF_TURNED_CELLS: f64 = 0.75;
 
-/// The update as written; unless its damping is, a fitted body's is what its outline allows, and less where cells turn.
-fn update(scene: &Scene, body: &Body, neighbours: &Neighbours, weights: &Weights) -> Update {
+/// The update as written; unless its damping is, a fitted body's is what its outline allows, and less where cells turn. Of a part
+/// all ranks find it together.
+fn update(
+    scene: &Scene,
+    body: &Body,
+    neighbours: &Neighbours,
+    weights: &Weights,
+    team: Option<&Team>,
+) -> Update {
     let Update { order, damping } = scene.update;
     let is_open = scene.raw.update.damping.is_none() && order == Order::Synchronous;
     match weights {
         Weights::Matrix(weights) if is_open && scene.equilibrium.is_none() => {
             let turned = if weights.cells.is_some() { OF_TURNED_CELLS } else { 1.0 };
-            Update { order, damping: turned * along_outline(body, neighbours, weights, damping) }
+            Update { order, damping: turned * along_outline(body, neighbours, weights, damping, team) }
         }
         _ => scene.update,
     }

@@ -277,7 +277,7 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
     cautions.extend(dead_pressure(scene));
     if let (Some(edge), Some(cells)) = (&plan.setup.free_edge, &plan.setup.cells) {
         let body = &plan.setup.body;
-        cautions.extend(edge_stress::cautions(edge.of(body, cells), body, cells));
+        cautions.extend(edge_stress::cautions(edge.of(body, cells), (body, cells), |own| own));
     }
     let led = |role: &Role| role.is_led();
     if !plan.setup.roles.iter().any(led) && scene.roles.iter().all(|entry| !led(&entry.role)) {

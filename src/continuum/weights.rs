@@ -74,7 +74,7 @@ fn of_material(
         false => material.weights(),
     };
     material.map(|material| Weights::Matrix(weights(material))).map_err(|error| match &body.part {
-        Some(part) => refuse(scene, &error.in_whole(part.first, part.whole.neighbours)),
+        Some(part) => refuse(scene, &error.in_whole(body, part.whole.neighbours)),
         None => refuse(scene, &error),
     })
 }

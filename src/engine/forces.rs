@@ -102,8 +102,9 @@ impl Forces {
     /// `None` where no part of the body has a particle that the entry holds; `held` are those of this one.
     fn reaction_of(&self, engine: &Engine, entry: usize, held: &[Held]) -> Option<Reaction> {
         let particles = engine.count_of_parts(held.len());
-        let sum =
-            |of: &dyn Fn(Held) -> [f64; 2]| engine.sum_of_parts([0.0; 2], held.iter().map(|&one| of(one)));
+        let sum = |of: &dyn Fn(Held) -> [f64; 2]| {
+            engine.sum_over([0.0; 2], held.iter().map(|&one| (one.particle, of(one))))
+        };
         let mean = |points: &Vectors| sum(&|one| points.get(one.particle)).map(|s| s / particles as f64);
         if particles == 0 {
             return None;
@@ -111,9 +112,9 @@ impl Forces {
         let centre = mean(&self.places);
         let moments = held.iter().map(|&one| {
             let of = |about| cross(minus(self.places.get(one.particle), about), self.held_by(one));
-            [of(centre), of([0.0; 2])]
+            (one.particle, [of(centre), of([0.0; 2])])
         });
-        let [moment, moment_about_origin] = engine.sum_of_parts([-0.0; 2], moments);
+        let [moment, moment_about_origin] = engine.sum_over([-0.0; 2], moments);
         Some(Reaction {
             key: format!("roles[{entry}]"),
             role: engine.changes()[entry].role.name().to_owned(),
@@ -151,7 +152,7 @@ impl Forces {
             [force[0], force[1], cross(self.places.get(i), force), f64::hypot(force[0], force[1]), work]
         };
         let start = [0.0, 0.0, -0.0, -0.0, -0.0];
-        let [x, y, moment, most, work] = engine.sum_of_parts(start, engine.body().owned().map(of));
+        let [x, y, moment, most, work] = engine.sum_over(start, engine.body().owned().map(|i| (i, of(i))));
         let size = f64::hypot(x, y);
         // Forces that cancel leave rounding.
         let displacement = (size > 1e-9 * most).then(|| work / size);
@@ -161,7 +162,7 @@ impl Forces {
     /// Forces times the displacements \[force length\].
     pub(crate) fn work_of(&self, forces: &Vectors, engine: &Engine) -> f64 {
         let work = |i: usize| [dot(forces.get(i), self.displacement.get(i))];
-        let [work] = engine.sum_of_parts([-0.0], engine.body().owned().map(work));
+        let [work] = engine.sum_over([-0.0], engine.body().owned().map(|i| (i, work(i))));
         work
     }
 

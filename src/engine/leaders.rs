@@ -63,10 +63,11 @@ impl Engine {
                 };
                 let own: Vec<usize> = (0..particles.len()).filter(meets).collect();
                 let Some(team) = self.parted() else { return Some(own).filter(|own| !own.is_empty()) };
-                let first = self.body.first();
-                let own: Vec<u64> = own.into_iter().map(|which| (first + particles[which]) as u64).collect();
+                let index = |which: usize| self.body.index(particles[which]) as u64;
+                let own: Vec<u64> = own.into_iter().map(index).collect();
                 let all = team.gather_all(&own);
-                let here = |&index: &u64| particles.binary_search(&(index as usize).checked_sub(first)?).ok();
+                let here =
+                    |&index: &u64| particles.binary_search(&self.body.exact_particle(index as usize)?).ok();
                 (!all.is_empty()).then(|| all.iter().filter_map(here).collect())
             }
             Some(_) => None,

@@ -117,8 +117,9 @@ impl Engine {
             free_edge,
             probes,
         } = setup;
-        let owned = body.first() + body.owned().start..body.first() + body.owned().end;
-        let own = |probe: &ProbeSeries| owned.contains(&probe.particle);
+        let owned = body.owned();
+        let own =
+            |probe: &ProbeSeries| body.exact_particle(probe.particle).is_some_and(|i| owned.contains(&i));
         let probes = probes.map(|all| all.into_iter().filter(own).collect());
         let present_neighbours = present_radius.map(|radius| PresentNeighbours {
             radius,

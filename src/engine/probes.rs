@@ -31,7 +31,7 @@ impl ProbeSeries {
     /// Appends the present state of the particle, which must stand here; to be called once at the start and once after every
     /// step.
     pub fn record(&mut self, engine: &Engine) {
-        let particle = self.particle - engine.body.first();
+        let particle = engine.body.exact_particle(self.particle).expect("it stands here");
         self.positions.push(engine.present().get(particle));
         self.pe1.push(engine.pe1(particle));
         self.pe2.push(engine.pe2(particle));

@@ -20,7 +20,6 @@ use crate::flock::body::{Body, Part};
 use crate::flock::fracture::{Bonds, Break};
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::vectors::{Vectors, distance};
-use crate::material::cells::Cells;
 use crate::ranks::Team;
 use crate::sweep::caches::Caches;
 use crate::sweep::domain::{Domain, Halo, Held, Needs, Share};
@@ -132,25 +131,44 @@ impl Engine {
 
     /// The sum of each of some numbers of particles over those of the whole body that belong to it, in order of index.
     pub(super) fn sum_of_particles<const N: usize>(&self, of: impl Fn(usize) -> [f64; N]) -> [f64; N] {
-        self.sum_of_parts([-0.0; N], self.body.owned().filter(|&i| self.roles[i].is_body()).map(of))
+        let own = self.body.owned().filter(|&i| self.roles[i].is_body());
+        self.sum_over([-0.0; N], own.map(|i| (i, of(i))))
     }
 
-    /// What `start` and the numbers of this part, which are its `own`, and those of the others add up to, in the order of the parts.
+    /// The sum of `start` and of numbers of particles, of those of this part and of the others, in the order of the whole body.
+    pub(crate) fn sum_over<const N: usize>(
+        &self,
+        start: [f64; N],
+        own: impl Iterator<Item = (usize, [f64; N])>,
+    ) -> [f64; N] {
+        self.sum_of_parts(start, own.map(|(i, own)| (self.body.index_after_all(i), own)))
+    }
+
+    /// What `start` and the numbers of this part, which are its `own`, and those of the others add up to, in the order of the parts;
+    /// those that have a place after all others, in the order of these.
     pub(crate) fn sum_of_parts<const N: usize>(
         &self,
         start: [f64; N],
-        own: impl Iterator<Item = [f64; N]>,
+        own: impl Iterator<Item = (Option<usize>, [f64; N])>,
     ) -> [f64; N] {
-        let add = |sums: [u64; N]| {
-            let add = |sums: [f64; N], own: [f64; N]| std::array::from_fn(|k| sums[k] + own[k]);
-            own.fold(sums.map(f64::from_bits), add).map(f64::to_bits)
-        };
-        let start = start.map(f64::to_bits);
-        match self.parted() {
-            Some(team) => team.chain(start, add),
-            None => add(start),
-        }
-        .map(f64::from_bits)
+        let add = |sums: [f64; N], own: [f64; N]| std::array::from_fn(|k| sums[k] + own[k]);
+        let mut later: Vec<u64> = Vec::new();
+        let before = own.filter_map(|(place, own)| match place {
+            None => Some(own),
+            Some(place) => {
+                later.extend([place as u64].into_iter().chain(own.map(f64::to_bits)));
+                None
+            }
+        });
+        let Some(team) = self.parted() else { return before.fold(start, add) };
+        let chained = team.chain(start.map(f64::to_bits), |sums| {
+            before.fold(sums.map(f64::from_bits), add).map(f64::to_bits)
+        });
+        let later = if self.body.has_some_after_all() { team.gather_all(&later) } else { Vec::new() };
+        let mut later: Vec<&[u64]> = later.chunks_exact(N + 1).collect();
+        later.sort_unstable_by_key(|of| of[0]);
+        let numbers = later.into_iter().map(|of| std::array::from_fn(|k| f64::from_bits(of[k + 1])));
+        numbers.fold(chained.map(f64::from_bits), add)
     }
 
     /// Whether it is so in any part of the body.
@@ -164,13 +182,8 @@ impl Engine {
     }
 
     /// The cells that belong to this part of the body, as their first corners do; all of a whole one.
-    pub(crate) fn owned_cells(&self) -> Range<usize> {
-        let owned = self.body.owned();
-        let of = |cells: &Cells| match self.body.part {
-            Some(_) => cells.before(owned.start)..cells.before(owned.end),
-            None => 0..cells.count(),
-        };
-        self.cells.as_ref().map_or(0..0, of)
+    pub(crate) fn owned_cells(&self) -> impl Iterator<Item = usize> + Clone + use<> {
+        self.cells.as_ref().map_or_else(Vec::new, |cells| cells.owned(&self.body)).into_iter().flatten()
     }
 
     /// The id of the first particle whose position is not finite.
@@ -188,8 +201,10 @@ impl Engine {
         let own = far.map_or((0, f64::NEG_INFINITY), |far| (self.body.id(far), apart(far)));
         let Some(team) = self.parted() else { return own };
         let all = team.each([own.0 as u64, own.1.to_bits()]);
-        let all = all.into_iter().map(|[id, apart]| (id as usize, f64::from_bits(apart)));
-        all.fold((0, f64::NEG_INFINITY), |most, one| if one.1 > most.1 { one } else { most })
+        let mut all: Vec<_> =
+            all.into_iter().map(|[id, apart]| (id as usize, f64::from_bits(apart))).collect();
+        all.sort_unstable_by_key(|(id, _)| *id);
+        all.into_iter().fold((0, f64::NEG_INFINITY), |most, one| if one.1 > most.1 { one } else { most })
     }
 
     /// For each step, whether it is so on any rank.
@@ -238,12 +253,12 @@ pub(crate) fn of_all_parts(
     neighbours: &Neighbours,
     found: Vec<Break>,
 ) -> Vec<Break> {
-    let (first, owned) = (body.first(), body.owned());
+    let owned = body.owned();
     // Of a bond between two parts, which both find, the one speaks that records it.
     let is_own =
         |one: &Break| owned.contains(&Bonds::recorded_from(one.pair.map(|i| i as usize), neighbours));
     let words_of = |Break { step, pair, place, length }: Break| {
-        let [a, b] = pair.map(|particle| (first + particle as usize) as u64);
+        let [a, b] = pair.map(|particle| body.index(particle as usize) as u64);
         [step as u64, a, b, place[0].to_bits(), place[1].to_bits(), length.to_bits()]
     };
     let own: Vec<u64> = found.into_iter().filter(is_own).flat_map(words_of).collect();

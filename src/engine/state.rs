@@ -37,6 +37,8 @@ pub struct EngineState<'a> {
     activity: Activity,
     /// Whether each bond is broken, eight to a byte; absent where none can break.
     broken: Option<Vec<u8>>,
+    /// Indices in the whole body of the last particles, which come there after those of all parts.
+    after_all: Vec<usize>,
 }
 
 /// A state that belongs to another plan.
@@ -55,27 +57,28 @@ impl<'a> EngineState<'a> {
     /// The state of an engine between two steps; of a part of a body that of its own particles, which are numbered as in the
     /// whole body.
     pub fn of(engine: &'a Engine) -> Self {
-        let (owned, first) = (engine.body.owned(), engine.body.first());
-        let leading = |led: &Led| Led { particle: first + led.particle, ..*led };
+        let (body, owned) = (&engine.body, engine.body.owned());
+        let leading = |led: &Led| Led { particle: body.index(led.particle), ..*led };
+        let own = body.part.as_ref().map_or_else(Vec::new, |_| body.owned_in_order());
         let flock = &engine.flock;
         let packed = |byte: usize, bonds: &crate::flock::fracture::Bonds| {
             let all = 8 * byte..(8 * byte + 8).min(flock.neighbours.index.len());
             all.fold(0, |bits, bond| bits | u8::from(bonds.is_broken(bond)) << (bond % 8))
         };
         let bytes = flock.neighbours.index.len().div_ceil(8);
-        let of = |points: &'a Vectors| match engine.body.part {
+        let of = |points: &'a Vectors| match body.part {
             None => Cow::Borrowed(points),
-            Some(_) => Cow::Owned(Vectors {
-                x: points.x[owned.clone()].to_vec(),
-                y: points.y[owned.clone()].to_vec(),
-            }),
+            Some(_) => Cow::Owned(own.iter().map(|&i| points.get(i)).collect()),
         };
         let leaders = engine.leaders.iter().filter(|led| owned.contains(&led.particle));
         Self {
             step: engine.step,
             present: of(&engine.present),
             previous: of(&engine.previous),
-            roles: Cow::Borrowed(&engine.roles[owned.clone()]),
+            roles: match body.part {
+                None => Cow::Borrowed(&engine.roles),
+                Some(_) => Cow::Owned(own.iter().map(|&i| engine.roles[i]).collect()),
+            },
             leaders: leaders.map(leading).collect(),
             guided: Cow::Borrowed(&engine.guided),
             breaks: Cow::Borrowed(&engine.breaks),
@@ -83,12 +86,14 @@ impl<'a> EngineState<'a> {
             // Those of a part are known by its broken pairs, which are those of the whole body.
             broken: (flock.bonds.as_ref().filter(|_| engine.body.part.is_none()))
                 .map(|bonds| (0..bytes).map(|byte| packed(byte, bonds)).collect()),
+            after_all: own.iter().filter_map(|&i| body.index_after_all(i)).collect(),
         }
     }
 
     /// The state for later, when the engine has gone on.
     pub fn into_owned(self) -> EngineState<'static> {
-        let Self { step, present, previous, roles, leaders, guided, breaks, activity, broken } = self;
+        let Self { step, present, previous, roles, leaders, guided, breaks, activity, broken, after_all } =
+            self;
         EngineState {
             step,
             present: Cow::Owned(present.into_owned()),
@@ -99,6 +104,7 @@ impl<'a> EngineState<'a> {
             breaks: Cow::Owned(breaks.into_owned()),
             activity,
             broken,
+            after_all,
         }
     }
 
@@ -122,12 +128,14 @@ impl<'a> EngineState<'a> {
         setup: &Setup,
     ) -> Result<EngineState<'static>, WrongState> {
         let body = &setup.body;
-        let (first, exact) = (body.first(), body.exact());
+        let exact = body.exact();
         // Those that are there for the others to have neighbours are never looked at.
         let (mut present, mut roles) = (Vectors::clone(&body.reference), setup.roles.clone());
         let (mut previous, mut leaders, mut known) = (present.clone(), Vec::new(), 0);
         for (begin, state) in pieces {
-            let here = |i: usize| (begin + i).checked_sub(first).filter(|i| exact.contains(i));
+            let regular = state.count().saturating_sub(state.after_all.len());
+            let index = |i: usize| if i < regular { begin + i } else { state.after_all[i - regular] };
+            let here = |i: usize| body.exact_particle(index(i));
             for (i, to) in (0..state.count()).filter_map(|i| Some((i, here(i)?))) {
                 present.set(to, state.present.get(i));
                 previous.set(to, state.previous.get(i));
@@ -135,7 +143,7 @@ impl<'a> EngineState<'a> {
                 known += 1;
             }
             leaders.extend(state.leaders.iter().filter_map(|led| {
-                let particle = led.particle.checked_sub(first).filter(|i| exact.contains(i))?;
+                let particle = body.exact_particle(led.particle)?;
                 let which = setup.changes.get(led.change)?.particles.binary_search(&particle).ok()?;
                 Some(Led { particle, which, ..*led })
             }));
@@ -154,9 +162,14 @@ impl<'a> EngineState<'a> {
             roles: Cow::Owned(roles),
             leaders,
             guided: Cow::Owned(Vec::new()),
-            broken: setup.flock.bonds.as_ref().map(|_| bits_of(&breaks, first, &setup.flock.neighbours)),
+            broken: setup
+                .flock
+                .bonds
+                .as_ref()
+                .map(|_| bits_of(&breaks, body.first(), &setup.flock.neighbours)),
             breaks: Cow::Owned(breaks),
             activity,
+            after_all: Vec::new(),
         })
     }
 

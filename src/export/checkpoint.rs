@@ -37,7 +37,7 @@ use crate::scene::Scene;
 pub const FILE: &str = "checkpoint";
 pub(super) const PART: &str = "checkpoint.part";
 const MAGIC: [u8; 8] = *b"FLOCKFRM";
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 const HEADER: usize = 24;
 const PROGRAM_VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -327,11 +327,12 @@ impl Checkpoint<'static> {
             return Ok(());
         }
         let Parts { first, others } = std::mem::take(&mut self.parts);
-        let (before, exact) = (setup.body.first(), setup.body.exact());
-        let needed = before + exact.start..before + exact.end;
+        let exact = setup.body.exact();
+        let needed = setup.body.index_from(exact.start)..setup.body.index_from(exact.end);
         let mut pieces = vec![(first, self.engine.clone())];
         for OtherPart { file, first, count } in others {
-            if first >= needed.end || first + count <= needed.start {
+            // Those with nothing but particles along an outline are beside it.
+            if first > needed.end || first + count < needed.start {
                 continue;
             }
             let path = folder.join(file);

@@ -20,6 +20,7 @@ use crate::engine::Engine;
 use crate::flock::body::Body;
 use crate::flock::fracture::Break;
 use crate::material::stress::StressState;
+use crate::ranks::Team;
 
 #[derive(Serialize)]
 struct FinalRow {
@@ -91,13 +92,20 @@ pub(super) fn write_final(
     engine: &Engine,
     stresses: Option<&[Option<StressState>]>,
 ) -> Result<Option<PathBuf>, ExportError> {
-    let (mut rows, team) = (final_rows(engine, stresses).peekable(), engine.parted());
+    let (body, team) = (engine.body(), engine.parted());
+    // Those along an outline come after all others, in their own order.
+    let last = body.owned().filter(|&i| body.index_after_all(i).is_some()).count();
+    let (mut rows, mut last) = {
+        let before = body.owned().len() - last;
+        (final_rows(engine, stresses).take(before).peekable(), final_rows(engine, stresses).skip(before))
+    };
     let Some(folder) = folder else {
         let Some(team) = team else { return Ok(None) };
         while rows.peek().is_some() {
             team.send_bytes(&text_of(rows.by_ref().take(ROWS_OF_A_PIECE)).unwrap_or_default());
         }
         team.send_bytes(&[]);
+        let _ = sorted(team, &mut last);
         return Ok(None);
     };
     let path = folder.path("final.csv");
@@ -115,12 +123,24 @@ pub(super) fn write_final(
             file = file.and_then(|mut file| file.write_all(&piece).map(|()| file));
         }
     }
-    file.and_then(|mut file| file.flush()).map_err(ExportError::io("write", &path))?;
+    let last = team.map_or_else(Vec::new, |team| sorted(team, &mut last));
+    file.and_then(|mut file| file.write_all(&last).and_then(|()| file.flush()))
+        .map_err(ExportError::io("write", &path))?;
     Ok(Some(path))
 }
 
 /// Rows that a rank sends at once.
 const ROWS_OF_A_PIECE: usize = 1 << 13;
+
+/// These rows of all ranks, in the order of their ids.
+fn sorted(team: &Team, own: impl Iterator<Item = FinalRow>) -> Vec<u8> {
+    let all = team.each_bytes(&text_of(own).unwrap_or_default()).concat();
+    let mut lines: Vec<&[u8]> = all.split_inclusive(|&byte| byte == b'\n').collect();
+    let digits = |line: &&[u8]| line.iter().take_while(|byte| byte.is_ascii_digit()).count();
+    // Without zeros before them, the shorter number is the smaller one.
+    lines.sort_by_key(|line| (digits(line), *line));
+    lines.concat()
+}
 
 fn text_of(rows: impl Iterator<Item = FinalRow>) -> io::Result<Vec<u8>> {
     let mut text = Vec::new();
@@ -145,7 +165,11 @@ fn final_rows(engine: &Engine, stresses: Option<&[Option<StressState>]>) -> impl
     let lowest = body.part.as_ref().map_or_else(|| [lowest(0), lowest(1)], |part| part.whole.lowest);
     let [first_column, first_row] = lowest.map(i64::from);
     // Energies and strains are found as they are written: all of them at once would take as much memory as the body.
-    let rows = body.owned().map(|row| body.in_row(row));
+    let order = body.part.as_ref().map(|_| body.owned_in_order());
+    let rows = body
+        .owned()
+        .enumerate()
+        .map(move |(n, row)| order.as_ref().map_or_else(|| body.in_row(row), |order| order[n]));
     rows.map(|i| (i, engine.strain(i))).map(move |(i, strain)| FinalRow {
         id: body.id(i),
         column: of_lattice(i).then(|| i64::from(body.sites[i][0]) - first_column + 1),

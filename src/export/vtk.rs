@@ -369,7 +369,9 @@ impl<'a> Grid<'a> {
                 let [a, b] = pair.map(|end| at_particle(stresses, end as usize));
                 std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
             };
-            let own = stresses.cells[engine.owned_cells()].iter().map(with_von_mises);
+            let own: Vec<_> =
+                engine.owned_cells().map(|cell| with_von_mises(&stresses.cells[cell])).collect();
+            let own = own.into_iter();
             write_stresses(out, cells, particles.chain(self.bonds.iter().map(between)).chain(own))?;
         }
         writeln!(out, "</CellData>")

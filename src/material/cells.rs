@@ -5,7 +5,6 @@
 //! corners are particles of the body; the frame, which stands for the world outside, has no cells.
 
 use std::ops::Range;
-use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
@@ -186,10 +185,26 @@ impl Cells {
         self.kind.push(kind);
     }
 
-    /// How many cells have their first corner before a particle, of a body whose cells are in the order of these.
+    /// How many whole cells have their first corner before a particle, where they are in the order of these.
     pub fn before(&self, particle: usize) -> usize {
-        let starts = &self.starts[..self.count()];
+        let starts = &self.starts[..self.count_whole()];
         starts.partition_point(|&start| (self.index[start as usize] as usize) < particle)
+    }
+
+    /// The cells that belong to this part of a body, as their first corners do, ascending in stretches; all of a whole one.
+    pub fn owned(&self, body: &Body) -> Vec<Range<usize>> {
+        if body.part.is_none() {
+            return std::iter::once(0..self.count()).collect();
+        }
+        let owned = body.owned();
+        let is_own = |cell: &usize| owned.contains(&(self.of(*cell)[0] as usize));
+        let cut = (self.count_whole()..self.count()).filter(is_own).map(|cell| cell..cell + 1);
+        std::iter::once(self.before(owned.start)..self.before(owned.end)).chain(cut).collect()
+    }
+
+    /// How many cells are whole: the first ones.
+    pub fn count_whole(&self) -> usize {
+        self.kind.partition_point(|&kind| (kind as usize) < self.whole)
     }
 
     /// Number of cells.
@@ -342,31 +357,6 @@ impl Cells {
         };
         self.iter().map(centre).collect()
     }
-}
-
-/// The body without the particles that are in no cell (sites that stick out of a curved or ragged
-/// edge, a frame), renumbered in the same order, with its neighbours and its cells. A frame is gone
-/// afterwards: free edges need none.
-pub fn without_loose_sites(body: &Body, neighbours: &Neighbours) -> (Body, Neighbours, Cells) {
-    let mut cells = Cells::of_body(body);
-    let incidence = cells.incidence(body.count());
-    let keep: Vec<usize> = (0..body.count()).filter(|&i| !incidence.of(i).is_empty()).collect();
-    let mut renumbered = vec![None; body.count()];
-    keep.iter().enumerate().for_each(|(new, &old)| renumbered[old] = Some(new as u32));
-    // Corners are kept, every one of them.
-    cells.index.iter_mut().for_each(|i| *i = renumbered[*i as usize].unwrap_or_default());
-    let kept = Body {
-        lattice: body.lattice.clone(),
-        sites: keep.iter().map(|&i| body.sites[i]).collect(),
-        reference: Arc::new(keep.iter().map(|&i| body.reference.get(i)).collect()),
-        is_frame: vec![false; keep.len()],
-        frame: None,
-        numbering: None,
-        outline: None,
-        part: None,
-    };
-    let seen = |&i: &usize| neighbours.of(i).iter().filter_map(|&j| renumbered[j as usize]);
-    (kept, Neighbours::from_lists(keep.iter().map(seen)), cells)
 }
 
 /// The neighbourhood that a material needs: for each particle, all those that share a cell with it.

@@ -149,8 +149,8 @@ pub fn energy(
     let (mean, measure) = patches.means(strains);
     let regions = patches.lambda.len();
     let of_region = |(region, lambda): (usize, &Option<f64>)| {
-        let patches = over.particles.clone().map(|i| i * regions + region);
-        let mut all = patches.map(|patch| measure[patch] * mean[patch] * mean[patch]);
+        let patches = over.particles.clone().map(|i| (i, i * regions + region));
+        let mut all = patches.map(|(i, patch)| (i, measure[patch] * mean[patch] * mean[patch]));
         lambda.unwrap_or(0.0) * (over.sum)(&mut all)
     };
     0.5 * patches.lambda.iter().enumerate().map(of_region).sum::<f64>()

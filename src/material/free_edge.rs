@@ -20,6 +20,8 @@ const INNER: f64 = -1e-6;
 #[derive(Clone, Debug)]
 pub struct FreeEdge {
     outline: Outline,
+    /// Sides of the boundary of the whole body, where this is of a part of one.
+    sides: Option<usize>,
     loads: Vec<Load>,
     /// \[length\]
     thickness: f64,
@@ -42,10 +44,14 @@ pub struct Edge {
 }
 
 impl FreeEdge {
-    /// `loads` act on the outline of a sheet of this `thickness` \[length\]; `held` names the components of each
+    /// The outline with how many sides the boundary of the whole body has, where this is of a part of one. `loads` act on the outline of a sheet of this `thickness` \[length\]; `held` names the components of each
     /// particle that a support or leader holds, shape \[count\].
-    pub fn new(outline: Outline, (loads, thickness): (Vec<Load>, f64), held: Vec<[bool; 2]>) -> Self {
-        Self { outline, loads, thickness, held, edge: OnceLock::new() }
+    pub fn new(
+        (outline, sides): (Outline, Option<usize>),
+        (loads, thickness): (Vec<Load>, f64),
+        held: Vec<[bool; 2]>,
+    ) -> Self {
+        Self { outline, sides, loads, thickness, held, edge: OnceLock::new() }
     }
 
     /// Tractions of the loads, and none elsewhere, in the middle of each side of the boundary, along those components that
@@ -66,7 +72,8 @@ impl FreeEdge {
         let places = &body.outline.as_ref()?.places;
         let incidence = cells.incidence(body.count());
         let sides = cells.boundary_sides(&incidence);
-        let fits = sides.len().saturating_mul(outline.pieces().count()) <= MOST_DISTANCES;
+        let fits =
+            self.sides.unwrap_or(sides.len()).saturating_mul(outline.pieces().count()) <= MOST_DISTANCES;
         if !fits {
             return None;
         }
@@ -96,6 +103,8 @@ impl FreeEdge {
         // Where everything is held no traction is known.
         let is_recovered =
             |(i, place): &(usize, Place)| held[*i] != [true; 2] && !is_inner_corner(outline, place);
+        let exact = body.exact();
+        let on_outline = on_outline.filter(|(i, _)| exact.contains(i));
         edge.particles = on_outline.filter(is_recovered).map(|(i, _)| i).collect();
         Some(edge)
     }

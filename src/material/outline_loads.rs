@@ -311,11 +311,11 @@ const MOST_RINGS: i64 = 64;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flock::body::Cut;
+    use crate::flock::body::{Cut, Outlay};
     use crate::flock::lattice::{Lattice, LatticeKind};
     use crate::geometry::portion::Selection;
     use crate::geometry::shape::Shape;
-    use crate::material::cells::{neighbourhood, without_loose_sites};
+    use crate::material::cells::{neighbourhood, templates};
     use crate::material::fit::fit;
     use crate::material::stiffness::area;
 
@@ -336,9 +336,10 @@ mod tests {
             let fitted = fit(&lattice, &outline).expect("fits");
             return (fitted.body, fitted.cells, outline);
         }
-        let near = neighbourhood(&lattice);
-        let (body, seen) = Body::build(lattice, &Cut::Shape(shape()), &near, None).expect("builds");
-        let (body, _, cells) = without_loose_sites(&body, &seen);
+        let (lattice, cut, near) = (&lattice, &Cut::Shape(shape()), &neighbourhood(&lattice));
+        let outlay = Outlay { lattice, cut, neighbourhood: near, frame: None, cells: templates(lattice) };
+        let (body, _) = outlay.lay_out(None).expect("builds");
+        let cells = Cells::of_body(&body);
         (body, cells, outline)
     }
 

@@ -17,12 +17,26 @@ impl Around {
     /// Of a place \[length\] in a cell, or no further than `reach` \[length\] outside all of them, where the nearest point
     /// of a cell stands for it.
     pub fn of(place: Point, cells: &Cells, reference: &Vectors, reach: f64) -> Option<Self> {
+        let (around, _, apart) = Self::nearest(place, (cells, 0..cells.count()), reference)?;
+        (apart <= reach).then_some(around)
+    }
+
+    /// Of the point nearest to a place \[length\] of some of the cells, with its cell, and how far it is \[length\]: the first of
+    /// several; `None` of no cells.
+    pub fn nearest(
+        place: Point,
+        (cells, among): (&Cells, impl Iterator<Item = usize>),
+        reference: &Vectors,
+    ) -> Option<(Self, usize, f64)> {
         let corners = |cell: &[u32]| cell.iter().map(|&i| reference.get(i as usize)).collect::<Vec<Point>>();
-        let near = cells.iter().map(|cell| (cell, nearest(&corners(cell), place)));
-        let (cell, at) = near
-            .min_by(|a, b| distance(a.1, place).total_cmp(&distance(b.1, place)))
-            .filter(|(_, at)| distance(*at, place) <= reach)?;
-        Some(Self { particles: cell.to_vec(), shares: shares(&corners(cell), at) })
+        let near = among.map(|cell| {
+            let at = nearest(&corners(cells.of(cell)), place);
+            (cell, at, distance(at, place))
+        });
+        let (cell, at, apart) = near.min_by(|a, b| a.2.total_cmp(&b.2))?;
+        let particles = cells.of(cell).to_vec();
+        let shares = shares(&corners(&particles), at);
+        Some((Self { particles, shares }, cell, apart))
     }
 
     /// The mean of what the particles have, by their shares, shape \[components\]; those that have nothing are left out.

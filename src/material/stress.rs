@@ -128,20 +128,31 @@ pub fn strain_energy(
     strain_energy_over(cells, elastic, (displacement, rotation), &Over::all(cells, displacement.len()))
 }
 
+/// Adds up what cells or particles have, each with its number.
+type Sum<'a> = &'a dyn Fn(&mut dyn Iterator<Item = (usize, f64)>) -> f64;
+
 /// The things that an energy is summed over: cells, or particles around which dilatations are averaged.
 pub struct Over<'a> {
     /// Those of the cells.
-    pub cells: Range<usize>,
+    pub cells: Vec<Range<usize>>,
     /// Those of the particles.
     pub particles: Range<usize>,
-    /// Adds up what they have, in their order.
-    pub sum: &'a dyn Fn(&mut dyn Iterator<Item = f64>) -> f64,
+    /// Adds up what cells have, each with its number, in their order.
+    pub sum_of_cells: Sum<'a>,
+    /// The same of particles.
+    pub sum: Sum<'a>,
 }
 
 impl Over<'_> {
     /// All of a body of so many particles.
     pub fn all(cells: &Cells, particles: usize) -> Self {
-        Self { cells: 0..cells.count(), particles: 0..particles, sum: &|all| all.sum() }
+        let sum: Sum<'static> = &|all| all.map(|(_, of)| of).sum();
+        Self {
+            cells: std::iter::once(0..cells.count()).collect(),
+            particles: 0..particles,
+            sum_of_cells: sum,
+            sum,
+        }
     }
 }
 
@@ -188,7 +199,8 @@ fn energy_over(
         let u = DVector::from_vec(a.zip(b).map(|(a, b)| a - b).collect());
         0.5 * u.dot(&(&elements[cells.kind[cell] as usize] * &u))
     };
-    let own = (over.sum)(&mut over.cells.clone().map(of_cell));
+    let own =
+        (over.sum_of_cells)(&mut over.cells.iter().cloned().flatten().map(|cell| (cell, of_cell(cell))));
     if !cells.average_dilatations(elastic) {
         return Ok(own);
     }
@@ -200,10 +212,10 @@ fn energy_over(
 /// How far each of some cells is turned \[rad\], shape \[cells\].
 pub fn turns<'a>(
     cells: &'a Cells,
-    of: Range<usize>,
+    of: impl IntoIterator<Item = usize> + 'a,
     displacement: &'a Vectors,
 ) -> impl Iterator<Item = f64> + 'a {
-    of.map(move |cell| turn(cells.shape(cell), &relative(cells, cell, displacement)))
+    of.into_iter().map(move |cell| turn(cells.shape(cell), &relative(cells, cell, displacement)))
 }
 
 /// Displacement of a cell's corners in the axes that turn with the cell, less that of the first \[length\].

@@ -116,19 +116,20 @@ pub enum WeightsError {
 }
 
 impl WeightsError {
-    /// The same where the first particle has this index in the whole body, in which a particle has as many neighbours at most.
-    pub fn in_whole(self, first: usize, most: usize) -> Self {
+    /// The same of a part of `body`, in the whole of which a particle has as many neighbours at most.
+    pub fn in_whole(self, body: &Body, most: usize) -> Self {
+        let id = |particle: usize| body.id(particle - 1);
         match self {
             Self::MissingNeighbour { particle, missing, corners, .. } => Self::MissingNeighbour {
-                particle: first + particle,
-                missing: first + missing,
+                particle: id(particle),
+                missing: id(missing),
                 neighbours: most,
                 corners,
             },
             Self::MissingMate { particle, missing, .. } => {
-                Self::MissingMate { particle: first + particle, missing: first + missing, neighbours: most }
+                Self::MissingMate { particle: id(particle), missing: id(missing), neighbours: most }
             }
-            Self::Singular { particle } => Self::Singular { particle: first + particle },
+            Self::Singular { particle } => Self::Singular { particle: id(particle) },
             other => other,
         }
     }

@@ -1,10 +1,25 @@
-//! Lattices and a material to try things with.
+//! Lattices, bodies of whole cells and a material to try things with.
 
-use flockform::flock::lattice::LatticeKind;
+use flockform::flock::body::{Body, Cut, Outlay};
+use flockform::flock::lattice::{Lattice, LatticeKind};
+use flockform::flock::neighbourhood::{Neighbourhood, Neighbours};
+use flockform::material::cells::{Cells, templates};
 use flockform::material::elastic::{Constants, Elastic};
 
 /// The six lattices, of about unit size.
 pub const KINDS: [LatticeKind; 6] = LatticeKind::SAMPLES;
+
+/// The body of a material on whole cells: of the sites that are at the corner of one.
+pub fn of_whole_cells(
+    lattice: &Lattice,
+    cut: &Cut,
+    neighbourhood: &Neighbourhood,
+) -> (Body, Neighbours, Cells) {
+    let outlay = Outlay { lattice, cut, neighbourhood, frame: None, cells: templates(lattice) };
+    let (body, neighbours) = outlay.lay_out(None).expect("builds");
+    let cells = Cells::of_body(&body);
+    (body, neighbours, cells)
+}
 
 /// A material stiff along fibres that are turned.
 pub fn fibres() -> Elastic {

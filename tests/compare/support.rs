@@ -6,11 +6,11 @@ use flockform::fem::Effort;
 use flockform::flock::body::{Body, Cut};
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::vectors::Vectors;
-use flockform::material::cells::{Cells, neighbourhood, without_loose_sites};
+use flockform::material::cells::{Cells, neighbourhood};
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::study::compare::run::{Compared, compare};
 
-pub use crate::samples::{KINDS, fibres};
+pub use crate::samples::{KINDS, fibres, of_whole_cells};
 use crate::scenes::load;
 
 pub fn sheet(young: f64, poisson: f64, plane: Plane) -> Elastic {
@@ -19,10 +19,7 @@ pub fn sheet(young: f64, poisson: f64, plane: Plane) -> Elastic {
 
 /// A body without particles that are in no cell.
 pub fn build(lattice: Lattice, columns: u32, rows: u32) -> (Body, Cells) {
-    let near = neighbourhood(&lattice);
-    let (body, neighbours) =
-        Body::build(lattice, &Cut::Count { columns, rows }, &near, None).expect("builds");
-    let (body, _, cells) = without_loose_sites(&body, &neighbours);
+    let (body, _, cells) = of_whole_cells(&lattice, &Cut::Count { columns, rows }, &neighbourhood(&lattice));
     (body, cells)
 }
 

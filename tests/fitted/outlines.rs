@@ -1,13 +1,13 @@
 //! Any polygon with a hole, on any lattice in any direction: areas, resultants, uniform strains, quality.
 
-use flockform::flock::body::{Body, Cut};
+use flockform::flock::body::{Cut, Outlay};
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::vectors::Vectors;
 use flockform::geometry::outline::Outline;
 use flockform::geometry::portion::Selection;
 use flockform::geometry::shape::Shape;
 use flockform::material::boundary::Boundary;
-use flockform::material::cells::{Cells, neighbourhood, without_loose_sites};
+use flockform::material::cells::{Cells, neighbourhood, templates};
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::material::fit::{Fitted, LEAST_AREA, LEAST_SIDE, LEAST_WIDTH, fit};
 use flockform::material::outline_loads::{Load, Loader, OutlineLoad, Push, Resultant};
@@ -158,9 +158,10 @@ fn cut_cells_cost_at_most_three_times_the_condition_and_eight_times_the_highest_
             holes: vec![Shape::Polygon { vertices: corners(1) }],
         };
         let lattice = fitted.body.lattice.clone();
-        let near = neighbourhood(&lattice);
-        let (body, seen) = Body::build(lattice, &Cut::Shape(shape), &near, None).expect("builds");
-        let (whole, _, whole_cells) = without_loose_sites(&body, &seen);
+        let (lattice, cut, near) = (&lattice, &Cut::Shape(shape), &neighbourhood(&lattice));
+        let outlay = Outlay { lattice, cut, neighbourhood: near, frame: None, cells: templates(lattice) };
+        let (whole, _) = outlay.lay_out(None).expect("builds");
+        let whole_cells = Cells::of_body(&whole);
         let fitted = spectrum(&fitted.cells, fitted.body.count(), &elastic);
         let whole = spectrum(&whole_cells, whole.count(), &elastic);
         let ratio = [fitted[0] / whole[0], fitted[1] / whole[1]];

@@ -1,12 +1,12 @@
 //! Plane strain near nu = 1/2: displacements are as good as at nu = 0.3, on every lattice.
 
-use flockform::flock::body::{Body, Cut};
+use flockform::flock::body::Cut;
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::rules::Rotation;
 use flockform::flock::vectors::Vectors;
 use flockform::geometry::outline::Outline;
 use flockform::geometry::shape::Shape;
-use flockform::material::cells::{neighbourhood_of, without_loose_sites};
+use flockform::material::cells::neighbourhood_of;
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::material::fit::fit;
 use flockform::material::loads::{Loads, Traction};
@@ -135,8 +135,7 @@ fn rows_of_averaged_dilatations_are_kept_by_class_on_a_lattice() {
             let lattice = Lattice::new(kind, [0.0; 2], 0.0);
             let near = neighbourhood_of(&lattice, &elastic);
             let cut = Cut::Count { columns: size, rows: size };
-            let (body, neighbours) = Body::build(lattice, &cut, &near, None).expect("builds");
-            let (body, neighbours, cells) = without_loose_sites(&body, &neighbours);
+            let (body, neighbours, cells) = of_whole_cells(&lattice, &cut, &near);
             MaterialWeights::assemble(&cells, &body, neighbours, &elastic).expect("assembles").rows.len()
         };
         let (small, large) = (classes(20), classes(30));

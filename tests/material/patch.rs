@@ -4,6 +4,7 @@ use flockform::flock::block::{Block, plus, transposed};
 use flockform::flock::body::Cut;
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::vectors::{Vectors, distance};
+use flockform::material::cells::neighbourhood;
 use flockform::material::loads::{Loads, Traction};
 use flockform::material::weights::MaterialWeights;
 
@@ -149,8 +150,8 @@ fn an_edge_column_under_uniform_tension_stretches_uniformly_and_contracts_freely
 fn weights_are_the_same_at_any_spacing() {
     let weights = |scale: f64, kind: fn(f64) -> LatticeKind| {
         let lattice = Lattice::new(kind(scale), [0.0; 2], 0.3);
-        let (body, neighbours, cells) =
-            build_without_loose_sites(lattice, &Cut::Count { columns: 4, rows: 4 });
+        let cut = Cut::Count { columns: 4, rows: 4 };
+        let (body, neighbours, cells) = of_whole_cells(&lattice, &cut, &neighbourhood(&lattice));
         MaterialWeights::assemble(&cells, &body, neighbours, &fibres()).expect("assembles").weights().blocks
     };
     for kind in

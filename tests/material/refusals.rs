@@ -5,7 +5,7 @@ use flockform::flock::lattice::Lattice;
 use flockform::flock::neighbourhood::Neighbourhood;
 use flockform::flock::vectors::Vectors;
 use flockform::geometry::shape::Shape;
-use flockform::material::cells::{Cells, without_loose_sites};
+use flockform::material::cells::{Cells, neighbourhood};
 use flockform::material::mechanism::Mechanism;
 use flockform::material::weights::{MaterialWeights, WeightsError};
 
@@ -18,9 +18,7 @@ fn neighbours_that_cannot_carry_the_material_are_refused_with_the_reason() {
         (KINDS[3], Neighbourhood::First { keep: Some(4) }),
         (KINDS[5], Neighbourhood::Second),
     ] {
-        let (body, neighbours) =
-            Body::build(Lattice::new(kind, [0.0; 2], 0.0), &CUT, &few, None).expect("builds");
-        let (body, neighbours, cells) = without_loose_sites(&body, &neighbours);
+        let (body, neighbours, cells) = of_whole_cells(&Lattice::new(kind, [0.0; 2], 0.0), &CUT, &few);
         let refused = MaterialWeights::assemble(&cells, &body, neighbours, &sheet(1.0, 0.3));
         let Err(error @ WeightsError::MissingNeighbour { .. }) = refused else {
             panic!("{kind:?}: {refused:?}")
@@ -54,12 +52,12 @@ fn more_neighbours_than_cells_need_change_nothing() {
 fn a_particle_in_no_cell_is_refused_by_name_and_the_body_without_it_passes() {
     // The outermost sites of a disc on a square lattice stick out.
     let disc = Cut::Shape(Shape::Disc { centre: [0.0, 0.0], radius: 3.0 });
-    let (body, neighbours, cells) = build(Lattice::new(KINDS[0], [0.0; 2], 0.0), &disc);
-    let refused = MaterialWeights::assemble(&cells, &body, neighbours.clone(), &sheet(1.0, 0.3));
+    let lattice = Lattice::new(KINDS[0], [0.0; 2], 0.0);
+    let (body, neighbours, cells) = build(lattice.clone(), &disc);
+    let refused = MaterialWeights::assemble(&cells, &body, neighbours, &sheet(1.0, 0.3));
     assert_eq!(refused, Err(WeightsError::Mechanism(Mechanism::NoCell { particle: 1 })));
-    let (smaller, neighbours, cells) = without_loose_sites(&body, &neighbours);
+    let (smaller, neighbours, cells) = of_whole_cells(&lattice, &disc, &neighbourhood(&lattice));
     assert_eq!(smaller.count(), body.count() - 4);
-    assert_eq!(cells, Cells::of_body(&smaller));
     assert!(MaterialWeights::assemble(&cells, &smaller, neighbours, &sheet(1.0, 0.3)).is_ok());
 }
 

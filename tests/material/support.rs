@@ -7,11 +7,11 @@ use flockform::flock::neighbourhood::Neighbours;
 use flockform::flock::rules::{Mean, Rotation, Rule};
 use flockform::flock::vectors::Vectors;
 use flockform::material::Block;
-use flockform::material::cells::{Cells, neighbourhood, without_loose_sites};
+use flockform::material::cells::{Cells, neighbourhood};
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::material::weights::MaterialWeights;
 
-pub use crate::samples::{KINDS, fibres};
+pub use crate::samples::{KINDS, fibres, of_whole_cells};
 
 pub fn sheet(young: f64, poisson: f64) -> Elastic {
     Elastic::new(Constants::Isotropic { young, poisson, plane: Plane::Stress }, 1.0).expect("admissible")
@@ -24,15 +24,10 @@ pub fn build(lattice: Lattice, cut: &Cut) -> (Body, Neighbours, Cells) {
     (body, neighbours, cells)
 }
 
-pub fn build_without_loose_sites(lattice: Lattice, cut: &Cut) -> (Body, Neighbours, Cells) {
-    let (body, neighbours, _) = build(lattice, cut);
-    without_loose_sites(&body, &neighbours)
-}
-
 /// A turned and shifted body of every lattice.
 pub fn sample(kind: LatticeKind, orientation: f64) -> (Body, Neighbours, Cells) {
     let lattice = Lattice::new(kind, [3.0, -2.0], orientation);
-    build_without_loose_sites(lattice, &Cut::Count { columns: 8, rows: 9 })
+    of_whole_cells(&lattice, &Cut::Count { columns: 8, rows: 9 }, &neighbourhood(&lattice))
 }
 
 /// Particles on a free side.

@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use flockform::continuum::digest::{digest, digest_of_parts};
 use flockform::continuum::mechanics::{Mechanics, Stresses};
 use flockform::continuum::parts::laid_out_whole_for;
+use flockform::continuum::places::at_places;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{run_shared, run_watched};
 use flockform::engine::Engine;
@@ -28,7 +29,7 @@ type KeptParts = (Vec<(usize, EngineState<'static>)>, Vec<ProbeSeries>, f64);
 fn kept_parts(scene: &Scene, step: usize, ranks: usize) -> Option<KeptParts> {
     let parts = on_ranks(ranks, |team| {
         let plan = Plan::of_part(scene, &team).unwrap_or_else(|error| panic!("{error}"));
-        let first = plan.setup.body.first() + plan.setup.body.owned().start;
+        let first = plan.setup.body.index_from(plan.setup.body.owned().start);
         let mut looks = Looks { keep_at: Some(step), ..Looks::every(step) };
         let outcome = run_shared(plan, None, &team, &mut looks).expect("can be shared");
         let (state, residual) = looks.kept?;
@@ -42,17 +43,21 @@ fn kept_parts(scene: &Scene, step: usize, ranks: usize) -> Option<KeptParts> {
 
 /// Those that a part has exactly see what they see in the whole body, by the same weights, and are loaded alike.
 fn assert_as_in_the_whole(part: &Plan, whole: &Plan) {
-    let (first, [part, whole]) = (part.setup.body.first(), [part, whole].map(|plan| &plan.setup));
+    let [part, whole] = [part, whole].map(|plan| &plan.setup);
     let force = |setup: &Setup, i: usize| setup.flock.forces.as_ref().map(|forces| forces.get(i));
     let seen = |setup: &Setup, i: usize| -> Vec<Site> {
         setup.flock.neighbours.of(i).iter().map(|&k| setup.body.sites[k as usize]).collect()
     };
+    assert_eq!(part.update, whole.update);
     for i in part.body.exact() {
-        assert_eq!(seen(part, i), seen(whole, first + i), "particle {}", first + i + 1);
+        let index = part.body.index(i);
+        assert_eq!((part.body.exact_particle(index), part.body.id(i)), (Some(i), index + 1));
+        assert_eq!(part.body.reference.get(i), whole.body.reference.get(index));
+        assert_eq!(seen(part, i), seen(whole, index), "particle {}", index + 1);
         if let [Weights::Matrix(part), Weights::Matrix(whole)] = [&part.flock.weights, &whole.flock.weights] {
-            assert_eq!(part.of(i), whole.of(first + i));
+            assert_eq!(part.of(i), whole.of(index));
         }
-        assert_eq!(force(part, i), force(whole, first + i), "particle {}", first + i + 1);
+        assert_eq!(force(part, i), force(whole, index), "particle {}", index + 1);
     }
 }
 
@@ -64,7 +69,8 @@ fn parted(scene: &Scene, every: usize, ranks: usize, from: Option<&KeptParts>) -
     let ends = on_ranks(ranks, |team| {
         let mut plan = Plan::of_part(scene, &team).unwrap_or_else(|error| panic!("{error}"));
         assert_as_in_the_whole(&plan, &whole);
-        let (count, owned) = (plan.count(), plan.setup.body.owned());
+        let (count, owned) = (plan.count(), plan.setup.body.owned_in_order());
+        let indices: Vec<usize> = owned.iter().map(|&i| plan.setup.body.index(i)).collect();
         assert_eq!(digest_of_parts(&plan, &team), sum);
         let mut looks = Looks::every(if team.is_first() { every } else { 1 });
         let from = from.map(|(parts, probes, residual)| {
@@ -76,9 +82,9 @@ fn parted(scene: &Scene, every: usize, ranks: usize, from: Option<&KeptParts>) -
         let (readings, stresses) = measured(scene, engine);
         let of = |points: &Vectors, i: usize| (points.x[i], points.y[i]);
         let places: Vec<_> =
-            owned.clone().map(|i| (of(engine.present(), i), of(engine.previous(), i))).collect();
-        let energies: Vec<_> = owned.clone().map(|i| [engine.pe1(i), engine.pe2(i)]).collect();
-        let roles = engine.roles()[owned.clone()].to_vec();
+            owned.iter().map(|&i| (of(engine.present(), i), of(engine.previous(), i))).collect();
+        let energies: Vec<_> = owned.iter().map(|&i| [engine.pe1(i), engine.pe2(i)]).collect();
+        let roles: Vec<_> = owned.iter().map(|&i| engine.roles()[i]).collect();
         let sums = engine.energies();
         (
             places,
@@ -86,7 +92,7 @@ fn parted(scene: &Scene, every: usize, ranks: usize, from: Option<&KeptParts>) -
             roles,
             (engine.step(), format!("{:?}", outcome.reason)),
             (outcome.residual, sums),
-            count,
+            (count, indices),
             engine.probes().to_vec(),
             (format!("{:?}", engine.breaks()), readings, stresses),
         )
@@ -109,35 +115,44 @@ fn parted(scene: &Scene, every: usize, ranks: usize, from: Option<&KeptParts>) -
         assert_eq!((&one.7.0, &one.7.1), (&end.breaks, &end.readings));
         assert_eq!((one.4.0.to_bits(), one.4.1.map(f64::to_bits)), (end.residual, sums.map(f64::to_bits)));
     }
-    let all =
-        |of: &dyn Fn(usize) -> Vec<f64>| (0..ends.len()).flat_map(of).map(f64::to_bits).collect::<Vec<_>>();
-    end.places.extend(all(&|r| ends[r].0.iter().map(|(now, _)| now.0).collect()));
-    end.places.extend(all(&|r| ends[r].0.iter().map(|(now, _)| now.1).collect()));
-    end.places.extend(all(&|r| ends[r].0.iter().map(|(_, then)| then.0).collect()));
-    end.places.extend(all(&|r| ends[r].0.iter().map(|(_, then)| then.1).collect()));
-    end.places.extend(all(&|r| ends[r].1.iter().flatten().copied().collect()));
-    end.places.extend(ends.iter().flat_map(|one| one.7.2.iter().copied()));
-    let roles: Vec<_> = ends.iter().flat_map(|one| one.2.clone()).collect();
+    // In the order of the whole body.
+    let of_rank = |rank: usize| ends[rank].5.1.iter().enumerate().map(move |(k, &index)| (index, rank, k));
+    let mut order: Vec<_> = (0..ends.len()).flat_map(of_rank).collect();
+    order.sort_unstable();
+    assert!(order.iter().map(|one| one.0).eq(0..whole.count()));
+    let order = || order.iter().map(|&(_, rank, k)| (&ends[rank], k));
+    end.places.extend(order().map(|(one, k)| one.0[k].0.0.to_bits()));
+    end.places.extend(order().map(|(one, k)| one.0[k].0.1.to_bits()));
+    end.places.extend(order().map(|(one, k)| one.0[k].1.0.to_bits()));
+    end.places.extend(order().map(|(one, k)| one.0[k].1.1.to_bits()));
+    end.places.extend(order().flat_map(|(one, k)| one.1[k].map(f64::to_bits)));
+    if scene.material.is_some() {
+        end.places.extend(order().flat_map(|(one, k)| one.7.2[k]));
+    }
+    let roles: Vec<_> = order().map(|(one, k)| one.2[k]).collect();
     end.roles = format!("{roles:?}");
     // Each is on one rank; the lists of the test are ascending.
     end.probes = ends.iter().flat_map(|one| one.6.clone()).collect();
-    end.seen.push((ends.iter().map(|one| one.5).max().unwrap_or(0), 0));
+    end.probes.sort_by_key(|probe| probe.particle);
+    end.seen.push((ends.iter().map(|one| one.5.0).max().unwrap_or(0), 0));
     end
 }
 
 /// The readings on the whole body, and stresses of a rank's own particles; nothing without a material.
-fn measured(scene: &Scene, engine: &Engine) -> (String, Vec<u64>) {
+fn measured(scene: &Scene, engine: &Engine) -> (String, Vec<[u64; 3]>) {
     let Some(elastic) = &scene.material else { return Default::default() };
     let stresses = Stresses::at_present(engine, elastic).expect("there are cells");
-    let own = engine.body().owned().map(|i| stresses.particles[i]);
+    let own = engine.body().owned_in_order().into_iter().map(|i| stresses.particles[i]);
     let of =
         |stress: Option<StressState>| stress.map_or([1; 3], |stress| stress.components.map(f64::to_bits));
     let readings = Mechanics::under(&stresses, engine, elastic).expect("there are cells");
-    (format!("{readings:#?}"), own.flat_map(of).collect())
+    let places = at_places(scene, engine, &stresses);
+    let cautions = readings.cautions(engine);
+    (format!("{readings:#?} {places:#?} {cautions:?}"), own.map(of).collect())
 }
 
 /// The histories of a run alone that is looked at in each step, and what is measured at its end.
-fn probed(scene: &Scene) -> (Vec<ProbeSeries>, (String, Vec<u64>)) {
+fn probed(scene: &Scene) -> (Vec<ProbeSeries>, (String, Vec<[u64; 3]>)) {
     let plan = planned(scene);
     let mut probes: Vec<_> = plan.probes.iter().map(|&index| ProbeSeries::new(index)).collect();
     let mut see = |engine: &Engine, _: f64| {
@@ -155,7 +170,7 @@ fn assert_parted_the_same(name: &str, sets: &[&str], every: usize) {
 fn assert_scene_parted_the_same(scene: &Scene, name: &str, every: usize) {
     let (probes, (readings, stresses)) = probed(scene);
     let mut expected = End { seen: Vec::new(), probes, readings, ..alone(scene, every) };
-    expected.places.extend(stresses);
+    expected.places.extend(stresses.into_iter().flatten());
     let kept = kept_parts(scene, every, 3);
     let begun = [1, 2, 3, 5, 8].map(|ranks| (ranks, None));
     for (ranks, from) in begun.into_iter().chain([(2, kept.as_ref()), (4, kept.as_ref())]) {
@@ -331,6 +346,57 @@ fn a_material_in_parts_has_the_bits_of_one_laid_out_as_a_whole() {
     }
 }
 
+#[test]
+fn a_material_fitted_to_its_outline_in_parts_has_the_bits_of_one_laid_out_as_a_whole() {
+    let lattice = |kind: &str| format!("lattice={{kind=\"{kind}\",spacing=1.0}}");
+    let [hexagonal, honeycomb] = ["hexagonal", "honeycomb"].map(lattice);
+    let fitted = "body.outline=\"fitted\"";
+    let rotates = "rule.mean={kind=\"material\",rotation=\"corotated\"}";
+    let inclusion = "body.inclusions=[{shape={kind=\"disc\",centre=[15.6,5.4],radius=2.6},\
+         material={kind=\"isotropic\",young=9000.0,poisson=0.2}}]";
+    let aligned = "body={shape={kind=\"rectangle\",max=[22,9]}}";
+    let turned =
+        "body={shape={kind=\"polygon\",vertices=[[0.2,0.1],[21.3,-0.4],[23.1,7.7],[12.0,9.9],[1.1,8.3]]}}";
+    let long = "body={shape={kind=\"polygon\",vertices=[[0.2,0.1],[60.3,-0.4],[120.1,3.7],[90.0,10.9],[1.1,8.3]]},\
+         holes=[{kind=\"disc\",centre=[30.4,4.3],radius=2.1},{kind=\"disc\",centre=[70.1,5.3],radius=2.6},\
+         {kind=\"disc\",centre=[100.2,5.9],radius=1.3}]}";
+    let strip = "body={shape={kind=\"rectangle\",max=[120,9]}}";
+    let probes = "record.probes=[1,30,61,100,501,600,1000]";
+    let several = "loads=[{kind=\"pressure\",region={kind=\"outline\",hole=1},pressure=9.0},\
+         {kind=\"traction\",region={kind=\"edge\",side=\"top\",depth=4.0},traction=[2.0,7.0],\
+         profile={from=[0.0,0.0],to=[20.0,1.0],factors=[0.5,1.5]}},\
+         {kind=\"force\",region={kind=\"disc\",centre=[17.0,6.0],radius=2.0},force=[0.5,-1.5]},\
+         {kind=\"body\",force=[0.1,-0.7]}]";
+    let traction = "loads=[{kind=\"traction\",region={kind=\"edge\",side=\"top\"},traction=[2.0,7.0]}]";
+    let places = "record.places=[[16.3,5.8],[2.1,5.5],[20.9,5.0],[12.0,8.0]]";
+    for sets in [
+        &[][..],
+        &[inclusion, several],
+        &[inclusion, rotates, &hexagonal, places],
+        &[aligned],
+        &[aligned, traction, places],
+        &[aligned, rotates],
+        &["lattice={kind=\"rectangular\",a=1.0,b=0.7}"],
+        &["lattice={kind=\"oblique\",a=1.0,b=0.9,angle=70.0}"],
+        &[&hexagonal],
+        &[&honeycomb],
+        &[turned],
+        &[turned, &hexagonal, traction],
+        &[long, several, probes],
+        &[long, several, rotates, places, probes],
+        &[long, several, &hexagonal, probes],
+        &[long, &honeycomb],
+        &[long, several, "lattice={kind=\"oblique\",a=1.0,b=0.9,angle=70.0}"],
+        &[strip, traction, places, probes],
+        &[rotates, several],
+        &[several, places],
+        &[several, &hexagonal],
+    ] {
+        let sets = [&[fitted][..], sets].concat();
+        assert_scene_parted_the_same(&plate(PLATE, &sets), &format!("{sets:?}"), 25);
+    }
+}
+
 /// Large enough for several steps together.
 #[test]
 fn a_large_material_in_parts_too() {
@@ -341,7 +407,8 @@ fn a_large_material_in_parts_too() {
 #[test]
 fn loads_on_a_body_in_parts_are_those_on_one_laid_out_as_a_whole() {
     let grid = "body={shape={kind=\"grid\",columns=24,rows=9}}";
-    let probes = "record.probes=[1,30,61,100]";
+    // Of the places one may be outside, one is on a side of two cells, one at a particle.
+    let probes = "record={probes=[1,30,61,100],places=[[16.3,5.8],[2.1,5.5],[20.9,5.0],[12.0,6.0],[7.0,7.3],[15.0,2.5]]}";
     let released = "roles[1]={region={kind=\"edge\",side=\"top\"},role=\"clamped\",from=30}";
     let pressure = "{kind=\"pressure\",region={kind=\"outline\",hole=1},pressure=9.0}";
     let traction = "{kind=\"traction\",region={kind=\"edge\",side=\"top\",depth=4.0},traction=[2.0,7.0],\
@@ -426,8 +493,21 @@ fn a_material_in_parts_is_refused_for_what_it_is_refused_for_as_a_whole() {
         |role: &str| format!("roles=[{{region={{kind=\"edge\",side=\"left\"}},role=\"clamped\"{role}}}]");
     let one = "roles=[{region={kind=\"ids\",ids=[100]},role=\"clamped\"}]";
     let paper = ["rule.mean.kind=\"barycentre\"", "neighbours={kind=\"second\"}"];
+    let fitted = |body: &str| format!("body={{outline=\"fitted\",{body}}}");
+    let thin = fitted("shape={kind=\"rectangle\",max=[18,0.5]}");
+    let small =
+        fitted("shape={kind=\"rectangle\",max=[18,9]},holes=[{kind=\"disc\",centre=[9.4,4.3],radius=0.3}]");
+    let slanted = fitted("shape={kind=\"polygon\",vertices=[[0,0],[40.2,1.3],[39,9.2],[1,8.1]]}");
     for (what, sets) in [
-        ("like a hinge", &[&hinge[..]][..]),
+        ("less than the spacing", &[&thin[..]][..]),
+        ("less than the spacing", &[&small]),
+        ("no leader holds", &[&slanted, &weight, "roles=[]"]),
+        ("can slide or turn", &[&slanted, &weight, &at(",axis=\"x\"")]),
+        ("no particle of the body lies", &[&slanted, &nowhere]),
+        ("no part of the outline lies", &[&slanted, &off]),
+        ("there is no particle 5000", &[&slanted, "record={probes=[5000]}"]),
+        ("a spacing away from the body", &[&slanted, "record={places=[[12.0,4.0],[50.4,4.3]]}"]),
+        ("like a hinge", &[&hinge[..]]),
         ("like a hinge", &[&hinge, &weight, &at("")]),
         ("no leader holds", &[&weight, "roles=[]"]),
         ("at one particle only", &[&weight, one]),
@@ -439,7 +519,8 @@ fn a_material_in_parts_is_refused_for_what_it_is_refused_for_as_a_whole() {
         ("no neighbours", &[few]),
         ("no chain of cells", &[apart, far]),
         ("are not connected", &[apart]),
+        ("a spacing away from the body", &["record={places=[[12.0,8.0],[8.4,4.3]]}"]),
     ] {
-        assert_refused_the_same(&plate(PLATE, &[sets, &["record.probes=[]"]].concat()), what);
+        assert_refused_the_same(&plate(PLATE, &[&["record.probes=[]"], sets].concat()), what);
     }
 }

@@ -22,14 +22,15 @@ mod sites;
 mod tests;
 mod tidy;
 
+use std::ops::Range;
 use std::sync::Arc;
 
-use self::cut::{Faces, Node};
+use self::cut::Faces;
 use self::near::NearPieces;
-use self::sites::Sites;
+use self::sites::{Columns, Sites};
 use super::cells::{Cells, templates};
 use super::stiffness::area;
-use crate::flock::body::{Body, OutlineParticles};
+use crate::flock::body::{Body, Census, Extent, OutlineParticles, cell_width};
 use crate::flock::lattice::{Lattice, Site};
 use crate::flock::vectors::{Vectors, distance};
 use crate::geometry::outline::{Outline, Place};
@@ -210,13 +211,8 @@ pub fn fit(lattice: &Lattice, outline: &Outline) -> Result<Fitted, FitError> {
 /// # Errors
 /// As [`fit`].
 pub fn fit_regions(lattice: &Lattice, outline: &Partition) -> Result<Fitted, FitError> {
-    let scale = Scale::of(lattice);
-    let near = NearPieces::new(outline, scale.diameter);
-    narrow::require_wide(outline, &near, scale.spacing)?;
-    let sites = Sites::find(lattice, outline, &scale)?;
-    let mut faces = cut::cut((lattice, outline, &near), &scale, &sites)?;
-    tidy::tidy(&mut faces, &scale);
-    Ok(Assembly { lattice, outline, scale: &scale, sites: &sites, faces: &faces }.body())
+    sites::require_few(lattice, outline.outline())?;
+    Band::of(lattice, outline)?.body()
 }
 
 impl Fitted {
@@ -245,57 +241,215 @@ impl Fitted {
     }
 }
 
-/// The parts that a body is put together from.
-struct Assembly<'a> {
-    lattice: &'a Lattice,
-    outline: &'a Partition,
-    scale: &'a Scale,
-    sites: &'a Sites,
-    faces: &'a Faces,
+/// What an outline decides on: the sites and cells near it. All that is farther inside is lattice.
+#[derive(Debug)]
+pub struct Band {
+    lattice: Lattice,
+    outline: Partition,
+    scale: Scale,
+    sites: Sites,
+    faces: Faces,
+    /// Whether each node is a particle, shape \[nodes\].
+    used: Vec<bool>,
+    /// The nodes that are particles and stand at no site, in their order along the outline.
+    along: Vec<u32>,
+    /// Number of each node in `along`, shape \[nodes\]; [`u32::MAX`] of all others.
+    number_along: Vec<u32>,
 }
 
-impl Assembly<'_> {
-    fn body(&self) -> Fitted {
-        let mut used = vec![false; self.faces.nodes.len()];
-        self.faces.cells().flat_map(|face| &face.corners).for_each(|&node| used[node as usize] = true);
-        for (number, near) in self.sites.near().iter().enumerate() {
-            used[number] |= self.is_in_far_cell(near.site);
+impl Band {
+    /// Fits the cells near an outline.
+    ///
+    /// # Errors
+    /// As [`fit`].
+    pub fn of(lattice: &Lattice, outline: &Partition) -> Result<Self, FitError> {
+        let scale = Scale::of(lattice);
+        let near = NearPieces::new(outline, scale.diameter);
+        narrow::require_wide(outline, &near, scale.spacing)?;
+        let sites = Sites::find(lattice, outline, &scale)?;
+        let mut faces = cut::cut((lattice, outline, &near), &scale, &sites)?;
+        tidy::tidy(&mut faces, &scale);
+        let (lattice, outline) = (lattice.clone(), outline.clone());
+        let (used, number_along) = (vec![false; faces.nodes.len()], vec![u32::MAX; faces.nodes.len()]);
+        let mut band = Self { lattice, outline, scale, sites, faces, used, along: Vec::new(), number_along };
+        band.find_particles();
+        Ok(band)
+    }
+
+    fn find_particles(&mut self) {
+        for &node in self.faces.cells().flat_map(|face| &face.corners) {
+            self.used[node as usize] = true;
         }
-        // Lattice sites near the outline that are in cells, and those far from it, in the order of sites.
-        let near = self.faces.nodes.iter().zip(&used).filter(|(_, used)| **used);
-        let near = near.filter_map(|(node, _)| node.site);
-        let mut sites: Vec<Site> = self.sites.far_inside().chain(near).collect();
-        sites.sort_unstable();
-        let regular = sites.len();
-        let index = |site: Site| sites.binary_search(&site).map_or(u32::MAX, |i| i as u32);
+        for (number, near) in self.sites.near().iter().enumerate() {
+            self.used[number] |= self.is_in_far_cell(near.site);
+        }
         let mut along: Vec<(Place, u32)> = Vec::new();
-        let mut particle = vec![u32::MAX; self.faces.nodes.len()];
-        for (number, node) in self.faces.nodes.iter().enumerate().filter(|(number, _)| used[*number]) {
+        for (number, node) in (0..).zip(&self.faces.nodes).filter(|(number, _)| self.used[*number as usize]) {
             match (node.site, node.place) {
-                (Some(site), _) => particle[number] = index(site),
-                (None, Some(place)) => along.push((place, number as u32)),
+                (Some(_), _) => {}
+                (None, Some(place)) => along.push((place, number)),
                 (None, None) => unreachable!("a node stands at a site or on the outline"),
             }
         }
         along.sort_by(|(a, _), (b, _)| order(a, b));
-        for (k, (_, node)) in along.iter().enumerate() {
-            particle[*node as usize] = (regular + k) as u32;
+        self.along = along.into_iter().map(|(_, node)| node).collect();
+        (0..).zip(&self.along).for_each(|(k, &node)| self.number_along[node as usize] = k);
+    }
+
+    /// Whether no cell is cut: then the body is that of the lattice.
+    pub fn is_whole(&self) -> bool {
+        self.faces.cells().all(|face| face.whole.is_some())
+    }
+
+    /// Particles that stand at no site, by their number, and the place of each \[length\].
+    pub fn along(&self) -> impl ExactSizeIterator<Item = [f64; 2]> {
+        self.along.iter().map(|&node| self.faces.nodes[node as usize].point)
+    }
+
+    /// Places \[length\] of all particles near the outline.
+    pub fn places(&self) -> impl Iterator<Item = [f64; 2]> {
+        self.faces.nodes.iter().zip(&self.used).filter(|(_, used)| **used).map(|(node, _)| node.point)
+    }
+
+    /// Where on the outline the particles at these sites are.
+    pub fn outline_of(&self, sites: &[Site]) -> OutlineParticles {
+        let of = |&site: &Site| {
+            let number = self.sites.number(site)? as usize;
+            let node = &self.faces.nodes[number];
+            node.place.filter(|place| self.used[number] && self.outline.is_bounding(place.ring))
+        };
+        OutlineParticles { regular: sites.len(), places: sites.iter().map(of).collect() }
+    }
+
+    /// The sites of some columns at which particles stand, ascending.
+    ///
+    /// # Errors
+    /// More columns than can be looked at together.
+    pub fn sites(&self, columns: Range<i32>) -> Result<Vec<Site>, FitError> {
+        Ok(self.regular(&self.sites.columns(&self.lattice, columns)?))
+    }
+
+    /// The columns in which something may stand.
+    pub fn columns(&self) -> Range<i32> {
+        self.sites.all_columns()
+    }
+
+    /// The column that a particle at no site is counted with.
+    fn column_of(&self, node: u32) -> i32 {
+        self.lattice.grid_coordinates(self.faces.nodes[node as usize].point)[0].round() as i32
+    }
+
+    /// Most columns from a particle to another at the same cell.
+    pub fn reach(&self) -> i32 {
+        let column = |&node: &u32| {
+            let site = self.faces.nodes[node as usize].site;
+            site.map_or_else(|| self.column_of(node), |site| site[0])
+        };
+        let width = |face: &cut::Face| {
+            let columns = face.corners.iter().map(column);
+            columns.clone().max().unwrap_or(0) - columns.min().unwrap_or(0)
+        };
+        self.faces.cells().map(width).fold(cell_width(&self.scale.templates), i32::max)
+    }
+
+    /// Particles of each of some columns that stand at no site, shape \[columns\].
+    pub fn count_along(&self, columns: Range<i32>) -> Vec<u64> {
+        let mut counts = vec![0; columns.len()];
+        for column in self.along.iter().map(|&node| self.column_of(node)).filter(|c| columns.contains(c)) {
+            counts[(column - columns.start) as usize] += 1;
         }
-        let place = |node: &Node| node.point;
-        let reference: Vectors = sites
-            .iter()
-            .map(|&site| self.lattice.position(site))
-            .chain(along.iter().map(|&(_, node)| place(&self.faces.nodes[node as usize])))
-            .collect();
-        let mut places = vec![None; reference.len()];
-        for (number, node) in self.faces.nodes.iter().enumerate().filter(|(number, _)| used[*number]) {
-            // Only what bounds the body is its outline.
-            places[particle[number] as usize] =
-                node.place.filter(|place| self.outline.is_bounding(place.ring));
+        counts
+    }
+
+    /// Counts the particles of some columns.
+    ///
+    /// # Errors
+    /// More columns than can be looked at together.
+    pub fn count(&self, columns: Range<i32>) -> Result<Census, FitError> {
+        let mut census = Census { counts: self.count_along(columns.clone()), extent: Extent::NONE };
+        let mut add = |place: [f64; 2], lowest: Site| {
+            census.extent = census.extent.or(Extent { bounds: (place, place), lowest, neighbours: 0 });
+        };
+        for &node in self.along.iter().filter(|&&node| columns.contains(&self.column_of(node))) {
+            add(self.faces.nodes[node as usize].point, Extent::NONE.lowest);
         }
-        let cells = self.cells(&sites, &particle, &reference);
+        for site in self.sites(columns.clone())? {
+            add(self.lattice.position(site), site);
+            census.counts[(site[0] - columns.start) as usize] += 1;
+        }
+        Ok(census)
+    }
+
+    /// The sites of some columns at which particles stand, ascending.
+    fn regular(&self, columns: &Columns<'_>) -> Vec<Site> {
+        // Those near the outline that are in cells, and those far from it.
+        let near = self.faces.nodes.iter().zip(&self.used).filter(|(_, used)| **used);
+        let near = near.filter_map(|(node, _)| node.site).filter(|&site| columns.has(site));
+        let mut sites: Vec<Site> = columns.far_inside().chain(near).collect();
+        sites.sort_unstable();
+        sites
+    }
+
+    /// The whole body.
+    ///
+    /// # Errors
+    /// More sites in its bounds than can be looked at together.
+    pub fn body(&self) -> Result<Fitted, FitError> {
+        self.lay_out(None).map(|(fitted, _)| fitted)
+    }
+
+    /// The whole body, or what stands in some columns: there particles at no site come after the others of their column, and not after
+    /// all others.
+    ///
+    /// # Errors
+    /// More columns than can be looked at together.
+    pub fn lay_out(&self, columns: Option<Range<i32>>) -> Result<(Fitted, Numbers), FitError> {
+        let is_part = columns.is_some();
+        let columns = self.sites.columns(&self.lattice, columns.unwrap_or(self.columns()))?;
+        let regular = self.regular(&columns);
+        let mut along: Vec<(i32, u32)> =
+            (0..).zip(&self.along).map(|(k, &n)| (self.column_of(n), k)).collect();
+        if is_part {
+            along.retain(|(column, _)| columns.has_column(*column));
+            along.sort_unstable();
+        }
         let step = if self.lattice.is_site([0, 1]) { 1 } else { 2 };
-        sites.extend((0..along.len() as i32).map(|k| [Body::ALONG_OUTLINE, k * step]));
+        let mut part = Laid { regular: &regular, ..Laid::default() };
+        part.along.resize(self.along.len(), u32::MAX);
+        let mut next = along.iter().peekable();
+        let add_along = |part: &mut Laid<'_>, k: u32| {
+            part.along[k as usize] = part.sites.len() as u32;
+            part.sites.push([Body::ALONG_OUTLINE, k as i32 * step]);
+            part.reference.push(self.faces.nodes[self.along[k as usize] as usize].point);
+            part.order.push(regular.len() as u32 + k);
+        };
+        for (number, &site) in (0..).zip(&regular) {
+            while let Some((_, k)) = next.next_if(|(column, _)| is_part && *column < site[0]) {
+                add_along(&mut part, *k);
+            }
+            part.here.push(part.sites.len() as u32);
+            part.sites.push(site);
+            part.reference.push(self.lattice.position(site));
+            part.order.push(number);
+        }
+        next.for_each(|(_, k)| add_along(&mut part, *k));
+        let mut places = vec![None; part.sites.len()];
+        for (number, node) in (0..).zip(&self.faces.nodes) {
+            if let Some(particle) = self.particle(&part, number) {
+                // Only what bounds the body is its outline.
+                places[particle as usize] = node.place.filter(|place| self.outline.is_bounding(place.ring));
+            }
+        }
+        let (cells, cut) = self.cells(&columns, &part);
+        let here = part.along.iter().enumerate().filter(|(_, here)| **here != u32::MAX);
+        let mut along: Vec<[usize; 2]> = here.map(|(k, &here)| [here as usize, k]).collect();
+        along.sort_unstable();
+        let column = |site: &Site| match site[0] {
+            Body::ALONG_OUTLINE => self.column_of(self.along[(site[1] / step) as usize]),
+            column => column,
+        };
+        let numbers = Numbers { along, cut, columns: part.sites.iter().map(column).collect() };
+        let Laid { sites, reference, .. } = part;
         let body = Body {
             lattice: self.lattice.clone(),
             is_frame: vec![false; sites.len()],
@@ -303,15 +457,24 @@ impl Assembly<'_> {
             reference: Arc::new(reference),
             frame: None,
             numbering: None,
-            outline: Some(Arc::new(OutlineParticles { regular, places })),
+            outline: Some(Arc::new(OutlineParticles { regular: regular.len(), places })),
             part: None,
         };
-        Fitted { body, cells }
+        Ok((Fitted { body, cells }, numbers))
     }
 
-    /// Whether a cell that is too far from the outline to be cut is inside.
-    fn is_far_cell(&self, [i, j]: Site, kind: usize) -> bool {
-        let inside = |corner: &Site| self.sites.is_inside([i + corner[0], j + corner[1]]);
+    /// The particle that a node is, if it is one of those laid out.
+    fn particle(&self, part: &Laid<'_>, node: u32) -> Option<u32> {
+        let (used, along) = (self.used[node as usize], self.number_along[node as usize]);
+        match self.faces.nodes[node as usize].site.filter(|_| used) {
+            Some(site) => part.index(site),
+            None => part.along.get(along as usize).copied().filter(|&here| here != u32::MAX),
+        }
+    }
+
+    /// Whether a cell that is too far from the outline to be cut is inside, as its corners are.
+    fn is_far_cell(&self, [i, j]: Site, kind: usize, is_inside: impl Fn(Site) -> bool) -> bool {
+        let inside = |corner: &Site| is_inside([i + corner[0], j + corner[1]]);
         !self.faces.is_candidate([i, j], kind) && self.scale.templates[kind].iter().all(inside)
     }
 
@@ -320,45 +483,85 @@ impl Assembly<'_> {
             let corners = self.scale.templates[kind].iter().map(move |corner| [i - corner[0], j - corner[1]]);
             corners.filter(|&base| self.lattice.is_site(base) && self.lattice.sublattice(base) == 0)
         };
-        let is_base = |kind: usize| bases(kind).any(|base| self.is_far_cell(base, kind));
-        self.sites.is_inside([i, j]) && (0..self.scale.templates.len()).any(is_base)
+        let is_inside = |site: Site| self.sites.is_inside(site);
+        let is_base = |kind: usize| bases(kind).any(|base| self.is_far_cell(base, kind, is_inside));
+        is_inside([i, j]) && (0..self.scale.templates.len()).any(is_base)
     }
 
-    /// Whole cells by their first corner, then the others.
-    fn cells(&self, sites: &[Site], particle: &[u32], reference: &Vectors) -> Cells {
-        let mut cells = Cells::of_lattice(self.lattice, self.outline.regions().len() + 1);
-        let index = |site: Site| sites.binary_search(&site).ok().map(|i| i as u32);
+    /// Whole cells by their first corner, then the others, and which of all these each is.
+    fn cells(&self, columns: &Columns<'_>, part: &Laid<'_>) -> (Cells, Vec<usize>) {
+        let mut cells = Cells::of_lattice(&self.lattice, self.outline.regions().len() + 1);
+        let is_inside = |site: Site| columns.is_inside(site);
         let mut corners = Vec::new();
-        for &[i, j] in sites.iter().filter(|&&site| self.lattice.sublattice(site) == 0) {
+        for &[i, j] in part.regular.iter().filter(|&&site| self.lattice.sublattice(site) == 0) {
             for (kind, template) in self.scale.templates.iter().enumerate() {
                 let region = match self.faces.whole([i, j], kind) {
-                    None if self.is_far_cell([i, j], kind) => {
-                        self.sites.region(template.iter().map(|c| [i + c[0], j + c[1]]))
+                    None if self.is_far_cell([i, j], kind, is_inside) => {
+                        columns.region(template.iter().map(|c| [i + c[0], j + c[1]]))
                     }
                     region => region,
                 };
                 if let Some(region) = region {
                     corners.clear();
-                    corners.extend(template.iter().filter_map(|c| index([i + c[0], j + c[1]])));
-                    cells.push(&corners, (region * self.scale.templates.len() + kind) as u32);
+                    corners.extend(template.iter().filter_map(|c| part.index([i + c[0], j + c[1]])));
+                    if corners.len() == template.len() {
+                        cells.push(&corners, (region * self.scale.templates.len() + kind) as u32);
+                    }
                 }
             }
         }
-        for face in self.faces.cells().filter(|face| face.whole.is_none()) {
+        let mut cut = Vec::new();
+        for (number, face) in self.faces.cells().filter(|face| face.whole.is_none()).enumerate() {
             corners.clear();
-            corners.extend(face.corners.iter().map(|&node| particle[node as usize]));
+            corners.extend(face.corners.iter().filter_map(|&node| self.particle(part, node)));
+            if corners.len() < face.corners.len() {
+                continue;
+            }
             // Begin with the lowest number: how a cell was found does not show.
-            let lowest = (0..corners.len()).min_by_key(|&k| corners[k]).unwrap_or_default();
+            let number_of = |k: usize| part.order[corners[k] as usize];
+            let lowest = (0..corners.len()).min_by_key(|&k| number_of(k)).unwrap_or_default();
             corners.rotate_left(lowest);
-            let [x, y] = reference.get(corners[0] as usize);
+            let [x, y] = part.reference.get(corners[0] as usize);
             let relative = |&i: &u32| {
-                let [px, py] = reference.get(i as usize);
+                let [px, py] = part.reference.get(i as usize);
                 [px - x, py - y]
             };
             let kind = cells.add_kind(corners.iter().map(relative).collect(), face.region);
             cells.push(&corners, kind);
+            cut.push(number);
         }
-        cells
+        (cells, cut)
+    }
+}
+
+/// What of a body that is laid out in some columns the whole has in another order.
+#[derive(Clone, Debug)]
+pub struct Numbers {
+    /// The particles at no site: their index here, and their number among all such, ascending.
+    pub along: Vec<[usize; 2]>,
+    /// Of each cut cell its number among all such.
+    pub cut: Vec<usize>,
+    /// The column that each particle is counted with; ascending in a part.
+    pub columns: Vec<i32>,
+}
+
+/// The particles that are laid out.
+#[derive(Default)]
+struct Laid<'a> {
+    /// Sites at which some of them stand, ascending, and these by their indices.
+    regular: &'a [Site],
+    here: Vec<u32>,
+    /// The index of each particle at no site; [`u32::MAX`] of those that are not here.
+    along: Vec<u32>,
+    sites: Vec<Site>,
+    reference: Vectors,
+    /// In which order the whole body has them.
+    order: Vec<u32>,
+}
+
+impl Laid<'_> {
+    fn index(&self, site: Site) -> Option<u32> {
+        self.regular.binary_search(&site).ok().map(|i| self.here[i])
     }
 }
 

@@ -1,5 +1,8 @@
 //! Which sites of a lattice are inside an outline, and which move onto it or onto the lines inside.
 
+use std::collections::HashMap;
+use std::ops::Range;
+
 use super::near::stretches;
 use super::{FitError, SNAP, STAYS, Scale, is_kept_corner};
 use crate::flock::lattice::{Lattice, Site};
@@ -32,14 +35,34 @@ pub struct NearSite {
     pub point: [f64; 2],
 }
 
-/// The sites in the bounds of an outline.
+/// The sites of a lattice that are near an outline, and where it has its inside.
 #[derive(Debug)]
 pub struct Sites {
+    /// The bounds of the outline, and a few sites around them.
     window: Window,
-    /// Number of each site near the outline in `near`, or one of the marks below.
-    marks: Vec<u32>,
+    inside: Inside,
+    /// Of the regions of the body, where it has several; only far from any line they are exact.
+    regions: Vec<Inside>,
+    /// Number of each site near the outline in `near`.
+    numbers: HashMap<Site, u32>,
     near: Vec<NearSite>,
-    /// Region of each site, where the body has several; only of those far from any line it is exact.
+}
+
+/// The rows of each column of a window between the crossings of an outline: first and last ones.
+#[derive(Debug)]
+struct Inside {
+    low: i32,
+    rows: Vec<Vec<[i32; 2]>>,
+}
+
+/// The sites of some columns, each where it is.
+#[derive(Debug)]
+pub struct Columns<'a> {
+    sites: &'a Sites,
+    window: Window,
+    /// Number of each site near the outline in [`Sites::near`], or one of the marks below.
+    marks: Vec<u32>,
+    /// Region of each site, where the body has several.
     regions: Vec<u16>,
 }
 
@@ -56,20 +79,75 @@ struct Bound {
 
 const FAR_OUTSIDE: u32 = u32::MAX;
 const FAR_INSIDE: u32 = u32::MAX - 1;
-const UNKNOWN: u32 = u32::MAX - 2;
+
+/// Whether the bounds of an outline hold no more sites than may be looked at together.
+///
+/// # Errors
+/// If they hold more.
+pub fn require_few(lattice: &Lattice, outline: &Outline) -> Result<(), FitError> {
+    Sites::window(lattice, outline).and_then(require_fits).map(drop)
+}
+
+fn require_fits(window: Window) -> Result<Window, FitError> {
+    if window.count() <= MOST_SITES { Ok(window) } else { Err(FitError::TooLarge { limit: MOST_SITES }) }
+}
+
+impl Inside {
+    /// Between the crossings, where arcs may be taken for short chords, as sites near them are looked at again.
+    fn of(outline: &Outline, lattice: &Lattice, window: &Window, scale: &Scale) -> Self {
+        let mut crossings: Vec<Vec<f64>> = vec![Vec::new(); window.columns as usize];
+        let low = window.low.map(i64::from);
+        for (.., piece) in outline.pieces() {
+            let count = match &piece.arc {
+                None => 1,
+                Some(_) => (piece.length() / (0.5 * scale.altitude)).ceil().clamp(8.0, 1e8) as usize,
+            };
+            let at = |k: usize| lattice.grid_coordinates(piece.point(k as f64 / count as f64));
+            let mut from = at(0);
+            for k in 1..=count {
+                let to = at(k);
+                let (first, last) = (from[0].min(to[0]).ceil() as i64, from[0].max(to[0]).ceil() as i64);
+                for column in first.max(low[0])..last.min(low[0] + window.columns) {
+                    let share = (column as f64 - from[0]) / (to[0] - from[0]);
+                    let row = from[1] + share * (to[1] - from[1]);
+                    crossings[(column - low[0]) as usize].push(row);
+                }
+                from = to;
+            }
+        }
+        let between = |mut rows: Vec<f64>| {
+            rows.sort_by(f64::total_cmp);
+            let most = low[1] + window.rows - 1;
+            let rows = rows.chunks_exact(2).map(|pair| {
+                [(pair[0].ceil() as i64).max(low[1]), (pair[1].floor() as i64).min(most)]
+                    .map(|row| row as i32)
+            });
+            rows.filter(|[first, last]| first <= last).collect()
+        };
+        Self { low: window.low[0], rows: crossings.into_iter().map(between).collect() }
+    }
+
+    fn of_column(&self, column: i32) -> &[[i32; 2]] {
+        let number = column.checked_sub(self.low).and_then(|k| usize::try_from(k).ok());
+        number.and_then(|k| self.rows.get(k)).map_or(&[], Vec::as_slice)
+    }
+
+    fn has(&self, [column, row]: Site) -> bool {
+        self.of_column(column).iter().any(|[first, last]| (*first..=*last).contains(&row))
+    }
+}
 
 impl Sites {
     pub fn find(lattice: &Lattice, outline: &Partition, scale: &Scale) -> Result<Self, FitError> {
-        let mut sites = Self::window(lattice, outline.outline())?;
-        for cell in sites.inside(lattice, outline.outline(), scale) {
-            sites.marks[cell] = FAR_INSIDE;
-        }
-        for (k, region) in outline.regions().iter().enumerate() {
-            sites.regions.resize(sites.marks.len(), 0);
-            for cell in sites.inside(lattice, region, scale) {
-                sites.regions[cell] = k as u16 + 1;
-            }
-        }
+        let window = Self::window(lattice, outline.outline())?;
+        let inside = |outline: &Outline| Inside::of(outline, lattice, &window, scale);
+        let mut sites = Self {
+            window,
+            inside: inside(outline.outline()),
+            regions: outline.regions().iter().map(inside).collect(),
+            numbers: HashMap::new(),
+            near: Vec::new(),
+        };
         let bounds = sites.find_near(lattice, outline, scale);
         let corners: Vec<(Place, [f64; 2])> = outline
             .pieces()
@@ -89,37 +167,55 @@ impl Sites {
 
     /// Number of a site near the outline.
     pub fn number(&self, site: Site) -> Option<u32> {
-        self.window.number(site).map(|cell| self.marks[cell]).filter(|&mark| mark < UNKNOWN)
+        self.numbers.get(&site).copied()
+    }
+
+    /// The columns in which something may stand.
+    pub fn all_columns(&self) -> Range<i32> {
+        self.window.low[0]..self.window.low[0] + self.window.columns as i32
+    }
+
+    /// The sites of some columns.
+    ///
+    /// # Errors
+    /// More than can be looked at together.
+    pub fn columns(&self, lattice: &Lattice, columns: Range<i32>) -> Result<Columns<'_>, FitError> {
+        let Window { low, rows, .. } = self.window;
+        let all = self.all_columns();
+        let (from, to) = (columns.start.max(all.start), columns.end.min(all.end));
+        let window = Window { low: [from, low[1]], columns: i64::from((to - from).max(0)), rows };
+        let mut marks = vec![FAR_OUTSIDE; require_fits(window)?.count() as usize];
+        let mut regions = vec![0; if self.regions.is_empty() { 0 } else { marks.len() }];
+        let each = |inside: &Inside, set: &mut dyn FnMut(usize)| {
+            for column in from..to {
+                for [first, last] in inside.of_column(column) {
+                    let sites =
+                        (*first..=*last).map(|row| [column, row]).filter(|&site| lattice.is_site(site));
+                    sites.filter_map(|site| window.number(site)).for_each(&mut *set);
+                }
+            }
+        };
+        each(&self.inside, &mut |cell| marks[cell] = FAR_INSIDE);
+        for (k, region) in (1..).zip(&self.regions) {
+            each(region, &mut |cell| regions[cell] = k);
+        }
+        for (number, near) in (0..).zip(&self.near) {
+            if let Some(cell) = window.number(near.site) {
+                marks[cell] = number;
+            }
+        }
+        Ok(Columns { sites: self, window, marks, regions })
     }
 
     /// Whether a site is inside and not on the outline.
     pub fn is_inside(&self, site: Site) -> bool {
-        match self.window.number(site).map(|cell| self.marks[cell]) {
-            None | Some(FAR_OUTSIDE | UNKNOWN) => false,
-            Some(FAR_INSIDE) => true,
+        match self.number(site) {
             Some(number) => self.near[number as usize].state == State::Inside,
+            None => self.inside.has(site),
         }
     }
 
-    /// The region of a cell with these corners, of which one at least is far from any line.
-    pub fn region(&self, mut corners: impl Iterator<Item = Site>) -> Option<usize> {
-        if self.regions.is_empty() {
-            return Some(0);
-        }
-        corners.find_map(|site| {
-            let cell = self.window.number(site).filter(|&cell| self.marks[cell] == FAR_INSIDE)?;
-            Some(self.regions[cell] as usize)
-        })
-    }
-
-    /// Sites inside that are far from the outline, ascending.
-    pub fn far_inside(&self) -> impl Iterator<Item = Site> + '_ {
-        (0..self.marks.len())
-            .filter(|&cell| self.marks[cell] == FAR_INSIDE)
-            .map(|cell| self.window.site(cell))
-    }
-
-    fn window(lattice: &Lattice, outline: &Outline) -> Result<Self, FitError> {
+    fn window(lattice: &Lattice, outline: &Outline) -> Result<Window, FitError> {
         let (low, high) = outline.bounds();
         let corners =
             [low, [high[0], low[1]], high, [low[0], high[1]]].map(|corner| lattice.grid_coordinates(corner));
@@ -127,51 +223,10 @@ impl Sites {
         // Far enough for the cells around every site near the outline.
         let lows = [0, 1].map(|k| extreme(k, f64::min).unwrap_or(0.0).floor() - 8.0);
         let highs = [0, 1].map(|k| extreme(k, f64::max).unwrap_or(0.0).ceil() + 8.0);
-        let size = (highs[0] - lows[0] + 1.0) * (highs[1] - lows[1] + 1.0);
-        let fits = lows.iter().chain(&highs).all(|v| v.abs() < 1e9) && size <= MOST_SITES as f64;
-        if !fits {
+        if !lows.iter().chain(&highs).all(|v| v.abs() < 1e9) {
             return Err(FitError::TooLarge { limit: MOST_SITES });
         }
-        let window = Window::new(lows.map(|v| v as i32), highs.map(|v| v as i32));
-        let marks = vec![FAR_OUTSIDE; window.count() as usize];
-        Ok(Self { window, marks, near: Vec::new(), regions: Vec::new() })
-    }
-
-    /// The sites inside an outline, column by column: between its crossings, where arcs may be taken for short chords, as
-    /// sites near them are looked at again.
-    fn inside(&self, lattice: &Lattice, outline: &Outline, scale: &Scale) -> Vec<usize> {
-        let mut crossings: Vec<Vec<f64>> = vec![Vec::new(); self.window.columns as usize];
-        let low = self.window.low.map(i64::from);
-        for (.., piece) in outline.pieces() {
-            let count = match &piece.arc {
-                None => 1,
-                Some(_) => (piece.length() / (0.5 * scale.altitude)).ceil().clamp(8.0, 1e8) as usize,
-            };
-            let at = |k: usize| lattice.grid_coordinates(piece.point(k as f64 / count as f64));
-            let mut from = at(0);
-            for k in 1..=count {
-                let to = at(k);
-                let (first, last) = (from[0].min(to[0]).ceil() as i64, from[0].max(to[0]).ceil() as i64);
-                for column in first.max(low[0])..last.min(low[0] + self.window.columns) {
-                    let share = (column as f64 - from[0]) / (to[0] - from[0]);
-                    let row = from[1] + share * (to[1] - from[1]);
-                    crossings[(column - low[0]) as usize].push(row);
-                }
-                from = to;
-            }
-        }
-        let mut inside = Vec::new();
-        for (column, mut rows) in crossings.into_iter().enumerate() {
-            rows.sort_by(f64::total_cmp);
-            for pair in rows.chunks_exact(2) {
-                let last = (pair[1].floor() as i64).min(low[1] + self.window.rows - 1);
-                for row in (pair[0].ceil() as i64).max(low[1])..=last {
-                    let cell = (column as i64 * self.window.rows + row - low[1]) as usize;
-                    inside.extend(Some(cell).filter(|&cell| lattice.is_site(self.window.site(cell))));
-                }
-            }
-        }
-        inside
+        Ok(Window::new(lows.map(|v| v as i32), highs.map(|v| v as i32)))
     }
 
     /// Finds the sites within reach of the outline and of the lines inside, with their nearest places. Returns the
@@ -197,9 +252,9 @@ impl Sites {
                     least..=most
                 };
                 for site in range(0).flat_map(|i| range(1).map(move |j| [i, j])) {
-                    let Some(cell) = self.window.number(site).filter(|_| lattice.is_site(site)) else {
+                    if !lattice.is_site(site) || self.window.number(site).is_none() {
                         continue;
-                    };
+                    }
                     let point = lattice.position(site);
                     let t = piece.nearest(point);
                     let apart = distance(piece.point(t), point);
@@ -208,13 +263,14 @@ impl Sites {
                     }
                     let place = Place { ring, piece: number, t };
                     let state = State::On { place, moved: true };
-                    let mark = self.marks[cell];
-                    let known = if mark >= UNKNOWN { self.near.len() } else { mark as usize };
-                    if mark >= UNKNOWN {
-                        self.marks[cell] = known as u32;
+                    let fresh = self.near.len() as u32;
+                    let known = *self.numbers.entry(site).or_insert(fresh);
+                    let (is_new, known) = (known == fresh, known as usize);
+                    if is_new {
                         self.near.push(NearSite { site, state, point });
                         distances.push(apart);
-                        bounds.push(Bound { place: None, apart: f64::INFINITY, was: mark == FAR_INSIDE });
+                        let was = self.inside.has(site);
+                        bounds.push(Bound { place: None, apart: f64::INFINITY, was });
                     } else if apart < distances[known] {
                         (self.near[known].state, distances[known]) = (state, apart);
                     }
@@ -269,6 +325,43 @@ impl Sites {
                 one.state = if inside { State::Inside } else { State::Outside };
             }
         }
+    }
+}
+
+impl Columns<'_> {
+    pub fn has_column(&self, column: i32) -> bool {
+        (0..self.window.columns).contains(&(i64::from(column) - i64::from(self.window.low[0])))
+    }
+
+    pub fn has(&self, site: Site) -> bool {
+        self.window.number(site).is_some()
+    }
+
+    /// See [`Sites::is_inside`].
+    pub fn is_inside(&self, site: Site) -> bool {
+        match self.window.number(site).map(|cell| self.marks[cell]) {
+            None | Some(FAR_OUTSIDE) => false,
+            Some(FAR_INSIDE) => true,
+            Some(number) => self.sites.near[number as usize].state == State::Inside,
+        }
+    }
+
+    /// The region of a cell with these corners, of which one at least is far from any line.
+    pub fn region(&self, mut corners: impl Iterator<Item = Site>) -> Option<usize> {
+        if self.regions.is_empty() {
+            return Some(0);
+        }
+        corners.find_map(|site| {
+            let cell = self.window.number(site).filter(|&cell| self.marks[cell] == FAR_INSIDE)?;
+            Some(self.regions[cell] as usize)
+        })
+    }
+
+    /// Sites inside that are far from the outline, ascending.
+    pub fn far_inside(&self) -> impl Iterator<Item = Site> + '_ {
+        (0..self.marks.len())
+            .filter(|&cell| self.marks[cell] == FAR_INSIDE)
+            .map(|cell| self.window.site(cell))
     }
 }
 
