@@ -4,10 +4,11 @@ use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
 use crate::engine::setup::RoleChange;
-use crate::flock::body::{Body, BodyError, Cut, Outlay, OutlineParticles};
+use crate::flock::body::{Body, BodyError, Cut, OutlineParticles};
 use crate::flock::lattice::Site;
 use crate::flock::motion::Motion;
 use crate::flock::neighbourhood::{Neighbourhood, NeighbourhoodError, Neighbours};
+use crate::flock::outlay::Outlay;
 use crate::flock::region::{Region, Side};
 use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Mean};

@@ -5,8 +5,9 @@
 //! bodies of 100,000 to 1,200,000 particles, aligned and fitted, and is the same for each particle.
 
 use super::plan::Plan;
-use crate::flock::body::{Cut, MOST_SITES};
+use crate::flock::body::Cut;
 use crate::flock::law::Weights;
+use crate::flock::outlay::MOST_SITES;
 use crate::flock::role::Role;
 use crate::geometry::outline::{Outline, Place};
 use crate::scene::{BodySource, Scene};

@@ -10,9 +10,11 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::layout::{FLAT, Layout, outlay_of, refuse_body, refuse_fit, to_be_fitted};
-use crate::flock::body::{AlongOutline, Body, Census, Cut, Extent, Outlay, Part, cell_width};
+use crate::flock::body::{Body, Cut};
 use crate::flock::lattice::Lattice;
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
+use crate::flock::outlay::{Census, Outlay, cell_width};
+use crate::flock::part::{AlongOutline, Extent, Part};
 use crate::flock::rules::Mean;
 use crate::geometry::partition::Partition;
 use crate::material::boundary::Boundary;

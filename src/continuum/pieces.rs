@@ -3,8 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::ops::Range;
 
-use crate::flock::body::{Body, BodyError, Part};
+use crate::flock::body::{Body, BodyError};
 use crate::flock::neighbourhood::Neighbours;
+use crate::flock::part::Part;
 use crate::geometry::disjoint_sets::DisjointSets;
 use crate::material::cells::{Cells, Incidence};
 use crate::material::mechanism::{HeldPlace, Hinge, Hold, Linkage, Mechanism, joined_cells};

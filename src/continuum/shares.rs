@@ -7,7 +7,7 @@ use super::plan::Plan;
 use super::run::require_shareable;
 use crate::engine::setup::Setup;
 use crate::engine::several::looks_at_every_step;
-use crate::flock::body::Part;
+use crate::flock::part::Part;
 use crate::scene::{Scene, SceneError};
 use crate::solve::corotated::is_corotated;
 use crate::solve::equilibrium::{Request, SolverShares, choose, shared_by};

@@ -7,7 +7,7 @@
 //! condition, frames that look after the sweep, observers. So what a body does hangs on no rank, and its bits on no number
 //! of them.
 //!
-//! A body may be laid out in [parts](crate::flock::body::Part): then each rank has no more than the particles that it moves and
+//! A body may be laid out in [parts](crate::flock::part::Part): then each rank has no more than the particles that it moves and
 //! some around them, and to gather is to receive these. What a rank finds, it finds of its own; sums over the whole body go
 //! through the ranks in their order.
 
@@ -16,9 +16,10 @@ use std::ops::{ControlFlow, Range};
 use super::Engine;
 use super::movement;
 use super::observer::Observer;
-use crate::flock::body::{Body, Part};
+use crate::flock::body::Body;
 use crate::flock::fracture::{Bonds, Break};
 use crate::flock::neighbourhood::Neighbours;
+use crate::flock::part::Part;
 use crate::flock::vectors::{Vectors, distance};
 use crate::ranks::Team;
 use crate::sweep::caches::Caches;

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use super::body::{Body, BodyError, MOST_ENTRIES};
+use super::body::{Body, BodyError};
 use super::grid::CellGrid;
 use super::neighbourhood::Neighbours;
 use super::numbering::{Numbering, order_in_columns};
+use super::outlay::MOST_ENTRIES;
 use super::vectors::{Vectors, distance};
 
 /// Points in the order in which their user has them.

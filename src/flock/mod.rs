@@ -23,6 +23,8 @@ pub mod manoeuvre;
 pub mod motion;
 pub mod neighbourhood;
 pub mod numbering;
+pub mod outlay;
+pub mod part;
 pub mod pseudo_energy;
 pub mod real;
 pub mod region;

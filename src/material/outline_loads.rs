@@ -311,8 +311,9 @@ const MOST_RINGS: i64 = 64;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flock::body::{Cut, Outlay};
+    use crate::flock::body::Cut;
     use crate::flock::lattice::{Lattice, LatticeKind};
+    use crate::flock::outlay::Outlay;
     use crate::geometry::portion::Selection;
     use crate::geometry::shape::Shape;
     use crate::material::cells::{neighbourhood, templates};

@@ -1,8 +1,9 @@
 //! Lattices, bodies of whole cells and a material to try things with.
 
-use flockform::flock::body::{Body, Cut, Outlay};
+use flockform::flock::body::{Body, Cut};
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::neighbourhood::{Neighbourhood, Neighbours};
+use flockform::flock::outlay::Outlay;
 use flockform::material::cells::{Cells, templates};
 use flockform::material::elastic::{Constants, Elastic};
 

@@ -1,7 +1,8 @@
 //! Any polygon with a hole, on any lattice in any direction: areas, resultants, uniform strains, quality.
 
-use flockform::flock::body::{Cut, Outlay};
+use flockform::flock::body::Cut;
 use flockform::flock::lattice::{Lattice, LatticeKind};
+use flockform::flock::outlay::Outlay;
 use flockform::flock::vectors::Vectors;
 use flockform::geometry::outline::Outline;
 use flockform::geometry::portion::Selection;
