@@ -23,7 +23,9 @@ use crate::material::elastic::Elastic;
 use crate::material::fit::{Band, Fitted, Numbers};
 use crate::material::recovery::REACH;
 use crate::ranks::Team;
-use crate::scene::{BodySource, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion, Weights};
+use crate::scene::{
+    BodySource, LeaderMotion, Load, LoadSteps, RoleEntry, Scene, SceneError, SceneRegion, Weights,
+};
 use crate::sweep::Order;
 use crate::sweep::caches::Caches;
 use crate::sweep::domain::{Share, cuts, steps_of};
@@ -42,7 +44,7 @@ pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
         (weights, "rule.weights"),
         (scene.update.order == Order::Sequential, "update.order"),
         (scene.equilibrium.is_some(), "equilibrium"),
-        (scene.load_steps.is_some(), "load_steps"),
+        (matches!(scene.load_steps, Some(LoadSteps::Solved(_))), "load_steps"),
         (scene.actions.iter().any(|action| !action.is_cut()), "actions"),
     ];
     let of_role = |(k, entry): (usize, &RoleEntry)| {

@@ -23,6 +23,7 @@ use scenes::{load, planned};
 mod parts;
 #[path = "../common/scenes.rs"]
 mod scenes;
+mod written;
 
 /// Everything that a run leaves, to the bit.
 #[derive(Clone, Debug, PartialEq)]
