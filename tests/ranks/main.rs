@@ -20,6 +20,7 @@ use flockform::solve::interrupt::Interrupt;
 
 use scenes::{load, planned};
 
+mod changed;
 mod parts;
 #[path = "../common/scenes.rs"]
 mod scenes;
