@@ -170,6 +170,7 @@ fn assert_alike_on_ranks(folder: &tempfile::TempDir, scenes: &[(&str, &[&str])])
 #[ignore = "needs mpirun"]
 fn what_is_wrong_is_said_once_and_nothing_is_left() {
     for (arguments, words) in [
+        (vec!["run", "tension", "--stepps", "3"], "unexpected argument '--stepps'"),
         (vec!["run", "tensio"], "no bundled scene"),
         (vec!["run", "tension", "--set", "rule.mean.kind=x"], "rule.mean"),
         (vec!["run", "tension", "--set", "update.order=sequential"], "cannot be shared by ranks"),
@@ -295,6 +296,7 @@ rule = { mean = { kind = "material" } }
 material = { kind = "isotropic", young = 1000.0, poisson = 0.3 }
 stop = { steps = 60 }
 loads = [{ kind = "pressure", region = { kind = "outline", hole = 1 }, pressure = 9.0 }]
+load_steps = { ramp = { steps = 40 }, every = 7 }
 record = { probes = [1, 300, 900, 1000], places = [[33.5, 5.0], [90.0, 7.0]] }
 
 [body]

@@ -239,7 +239,9 @@ impl<'a> Checkpointer<'a> {
     ) -> Result<(), ExportError> {
         let of = (&self.asked, self.scene, self.digest);
         let animation = kept.animation.map(RunRecorder::animation_state);
-        let recorded = (kept.snapshots, kept.probes, kept.load_steps, animation);
+        // All ranks have the same rows; a run is gone on with by those of the first.
+        let load_steps = if folder.is_some() { kept.load_steps } else { &[] };
+        let recorded = (kept.snapshots, kept.probes, load_steps, animation);
         let state = (EngineState::of(engine), residual);
         let mut checkpoint = Checkpoint::new(of, state, recorded, self.stepping());
         if let Some(team) = engine.parted() {

@@ -220,6 +220,9 @@ pub enum Refusal {
         "`{then}` is called `{now}` now\n  help: `flockform --help` lists every command, and `--help` after one its options"
     )]
     Renamed { then: &'static str, now: &'static str },
+    /// Words of the parser: what is wrong with a command line, or the help that it asks for.
+    #[error("{}", .0.to_string().trim_start_matches("error: ").trim_end())]
+    Usage(clap::Error),
     #[error("{0}")]
     Export(#[from] export::ExportError),
     #[error("{0}")]
@@ -321,8 +324,12 @@ impl Refusal {
 /// The command line, with the ROS arguments split off.
 ///
 /// # Errors
-/// Malformed ROS arguments, or ROS arguments for a command that is no node.
+/// One that cannot be read: of several ranks that have the same, the first one speaks.
 pub fn arguments() -> Result<(Arguments, RosArguments), Refusal> {
+    read_arguments().map_err(ranks::said_by_one)
+}
+
+fn read_arguments() -> Result<(Arguments, RosArguments), Refusal> {
     let all = std::env::args_os().map(|argument| argument.to_string_lossy().into_owned());
     let all: Vec<String> = all.collect();
     let is_asked = all.iter().any(|argument| argument == "--ros-args");
@@ -335,11 +342,7 @@ pub fn arguments() -> Result<(Arguments, RosArguments), Refusal> {
     };
     let arguments = Arguments::try_parse_from(rest).map_err(|error| match renamed(&error) {
         Some((then, now)) => Refusal::Renamed { then, now },
-        None if error.use_stderr() => error.exit(),
-        None => match error.print() {
-            Err(lost) if lost.kind() != ErrorKind::BrokenPipe => Refusal::Print(lost),
-            _ => std::process::exit(error.exit_code()),
-        },
+        None => Refusal::Usage(error),
     })?;
     match arguments.command {
         Command::Node(node::NodeArguments { transport: Transport::Ros2, .. })
@@ -378,6 +381,12 @@ pub fn refuse(refusal: &Refusal) -> ExitCode {
     if matches!(refusal, Refusal::Ranks(ranks::RanksError::SaidElsewhere)) {
         // A launcher ends all ranks when one of them fails: the one that speaks fails, and gets to speak.
         return ExitCode::SUCCESS;
+    }
+    if let Refusal::Usage(usage) = refusal {
+        return match usage.print() {
+            Err(lost) if lost.kind() != ErrorKind::BrokenPipe => refuse(&Refusal::Print(lost)),
+            _ => u8::try_from(usage.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from),
+        };
     }
     eprintln!("error: {}", on_terminal(&refusal.to_string()));
     ExitCode::from(if refusal.is_failure() { FAILED } else { BAD_INPUT })

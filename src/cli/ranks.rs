@@ -87,6 +87,16 @@ pub fn team() -> Result<Option<Team>, RanksError> {
     Err(said_once(place, RanksError::NoMpi { variable, count }))
 }
 
+/// Has one of the ranks say what all of them say before they know each other; one that stands alone says it itself.
+pub fn said_by_one(refusal: Refusal) -> Refusal {
+    match team() {
+        Ok(team) => Start::new(team.as_ref()).refused(refusal),
+        // The others have the same command line.
+        Err(_) if place().is_some_and(|place| place.rank > 0) => RanksError::SaidElsewhere.into(),
+        Err(_) => refusal,
+    }
+}
+
 /// The beginning of a run on ranks: none steps before all are ready, and if one refuses, all end.
 pub struct Start<'a> {
     team: Option<&'a Team>,

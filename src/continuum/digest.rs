@@ -95,9 +95,12 @@ fn digest_of(plan: &Plan, team: Option<&Team>) -> u64 {
         }
     };
     weights(&mut digest, &flock.weights);
-    for component in flock.forces.iter().chain(&flock.rest).flat_map(|points| [&points.x, &points.y]) {
-        of_body(&mut digest, &|digest, i| digest.numbers(&[component[i]]));
-    }
+    let vectors = |digest: &mut Fnv, of: [&Option<Vectors>; 2]| {
+        for component in of.into_iter().flatten().flat_map(|points| [&points.x, &points.y]) {
+            of_body(digest, &|digest, i| digest.numbers(&[component[i]]));
+        }
+    };
+    vectors(&mut digest, [&flock.forces, &flock.rest]);
     if let Some(ramp) = ramp {
         digest.text(&format!("ramp {ramp}"));
     }
@@ -125,7 +128,7 @@ fn digest_of(plan: &Plan, team: Option<&Team>) -> u64 {
                 let Conduct { rule, fracture, update, forces, rest, .. } = &**conduct;
                 digest.text(&format!("{rule:?} {fracture:?} {update:?}"));
                 weights(&mut digest, &conduct.weights);
-                forces.iter().chain(rest).for_each(|points| digest.points(points));
+                vectors(&mut digest, [forces, rest]);
             }
         }
     }
@@ -209,11 +212,6 @@ impl Fnv {
 
     fn numbers(&mut self, numbers: &[f64]) {
         numbers.iter().for_each(|number| self.bytes(&number.to_bits().to_le_bytes()));
-    }
-
-    fn points(&mut self, points: &Vectors) {
-        self.numbers(&points.x);
-        self.numbers(&points.y);
     }
 }
 

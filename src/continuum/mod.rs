@@ -6,6 +6,7 @@
 //! [`equilibrium`] goes straight to rest instead of stepping.
 
 mod active_share;
+mod among;
 pub mod builder;
 pub mod bulk_response;
 mod damping;

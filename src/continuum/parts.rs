@@ -9,6 +9,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::among::followed;
 use super::layout::{FLAT, Layout, outlay_of, refuse_body, refuse_fit, to_be_fitted};
 use crate::flock::body::{Body, Cut};
 use crate::flock::lattice::Lattice;
@@ -23,7 +24,7 @@ use crate::material::elastic::Elastic;
 use crate::material::fit::{Band, Fitted, Numbers};
 use crate::material::recovery::REACH;
 use crate::ranks::Team;
-use crate::scene::{BodySource, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion, Weights};
+use crate::scene::{BodySource, LeaderMotion, Load, LoadSteps, RoleEntry, Scene, SceneError, SceneRegion};
 use crate::sweep::Order;
 use crate::sweep::caches::Caches;
 use crate::sweep::domain::{Share, cuts, steps_of};
@@ -31,19 +32,16 @@ use crate::sweep::rows::usual_band;
 
 /// The key for which a scene has to be laid out as a whole, on every rank; `None` where each can lay out its part.
 pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
-    let weights = matches!(scene.weights, Some(Weights::Solved | Weights::Gradient { .. }));
     let averages = |elastic: &Elastic| elastic.averaged_dilatation().is_some();
     let materials = || scene.material.iter().chain(scene.inclusions.iter().map(|part| &part.material));
-    let is_of_rule = matches!(scene.mean, Mean::Material { .. }) && !materials().any(averages);
-    let keys: [(bool, &str); 8] = [
+    let keys: [(bool, &str); 7] = [
         (!matches!(scene.body, BodySource::Cut(_)), "body.shape"),
-        (scene.is_fitted && !is_of_rule, "body.outline"),
+        (scene.is_fitted && materials().any(averages), "body.outline"),
         (matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. }), "neighbours.kind"),
-        (weights, "rule.weights"),
         (scene.update.order == Order::Sequential, "update.order"),
         (scene.equilibrium.is_some(), "equilibrium"),
-        (scene.load_steps.is_some(), "load_steps"),
-        (scene.actions.iter().any(|action| !action.is_cut()), "actions"),
+        (matches!(scene.load_steps, Some(LoadSteps::Solved(_))), "load_steps"),
+        (followed(scene).any(|(_, changed)| is_laid_out_otherwise(scene, changed)), "actions"),
     ];
     let of_role = |(k, entry): (usize, &RoleEntry)| {
         let is_led_by_truth = matches!(entry.motion, Some(LeaderMotion::Reference { .. }));
@@ -51,6 +49,14 @@ pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
     };
     let key = keys.into_iter().find(|(is, _)| *is).map(|(_, key)| key.to_owned());
     key.or_else(|| scene.roles.iter().enumerate().find_map(of_role))
+}
+
+/// Whether keys that change on the way ask for other columns around those of a part, or for the whole.
+fn is_laid_out_otherwise(scene: &Scene, changed: &Scene) -> bool {
+    let is_material = |scene: &Scene| matches!(scene.mean, Mean::Material { .. });
+    is_material(changed) != is_material(scene)
+        || changed.neighbourhood != scene.neighbourhood
+        || laid_out_whole_for(changed).is_some()
 }
 
 /// Which columns of a body are whose.
@@ -401,6 +407,7 @@ fn is_along_outline(scene: &Scene) -> bool {
     scene.is_fitted
         || scene.loads.iter().any(|load| matches!(load, Load::Outline { .. }))
         || (scene.material.is_some() && is_by_count && scene.roles.iter().any(of_role))
+        || followed(scene).any(|(_, changed)| is_along_outline(changed))
 }
 
 /// The boundary of the cells whose first corner is in some columns, in their order; nothing where nothing is on it.

@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::among::{Among, followed, require_loaded};
 use super::damping::along_outline;
 use super::layout::{Layout, ReferenceMotion, held_components, no_particle, refuse_pieces};
 use super::parts::{Parting, agreed};
-use super::pieces::{linkage, require_connected, require_held};
+use super::pieces::require_connected;
 use super::{places, weights};
 use crate::engine::probes::ProbeSeries;
 use crate::engine::setup::{Conduct, RoleChange, Setup, of_first_roles};
@@ -24,7 +25,6 @@ use crate::geometry::outline::Outline;
 use crate::material::free_edge::FreeEdge;
 use crate::material::mechanism::{self, Mechanism};
 use crate::material::outline_loads::{Load, Resultant, sum};
-use crate::material::weights::WeightsError;
 use crate::ranks::Team;
 use crate::scene::{LoadSteps, Scene, SceneError, Stop};
 use crate::solve::linear::HeldComponent;
@@ -70,8 +70,18 @@ impl Plan {
         layout: Layout,
         reference: Option<ReferenceMotion<'_>>,
     ) -> Result<Self, SceneError> {
+        Self::laid_out(scene, layout, reference, &Layout::new)
+    }
+
+    /// The plan of a body laid out by `lay_out`.
+    fn laid_out(
+        scene: &Scene,
+        layout: Layout,
+        reference: Option<ReferenceMotion<'_>>,
+        lay_out: LayOut<'_>,
+    ) -> Result<Self, SceneError> {
         let changes = layout.role_changes(scene, reference)?;
-        let mut plan = Self::of_roles(scene, layout, changes)?;
+        let mut plan = Self::of_roles(scene, layout, changes, lay_out)?;
         make_cuts(&mut plan.setup, scene, |_, _, found| found);
         Ok(plan)
     }
@@ -93,53 +103,36 @@ impl Plan {
         for (k, change) in changes.iter().enumerate() {
             is_anywhere(change.particles.iter().any(|i| owned.contains(i)), format!("roles[{k}]"))?;
         }
-        let loads = agreed(scene, team, layout.loads(scene))?;
-        for (k, load) in loads.iter().enumerate() {
-            if let Load::Particles { particles, .. } = load {
-                let own = particles.iter().any(|&i| owned.contains(&(i as usize)));
-                is_anywhere(own, format!("loads[{k}]"))?;
-            }
+        require_loaded(scene, &layout, team)?;
+        for (k, changed) in followed(scene) {
+            require_loaded(changed, &layout, team).map_err(|error| refuse_keys(scene, k, &error))?;
         }
-        let mut plan = agreed(scene, team, Self::of_roles(scene, layout, changes))?;
-        plan.require_held_together(scene, team)?;
-        let Setup { body, flock, .. } = &plan.setup;
-        plan.setup.update = update(scene, body, &flock.neighbours, &flock.weights, Some(team));
-        places::around(scene, (&plan.setup.body, plan.setup.cells.as_ref()), Some(team))?;
-        if plan.setup.flock.bonds.is_some() && u32::try_from(plan.setup.body.total()).is_err() {
+        let lay_out = |changed: &Scene| parting.lay_out(changed, team.rank());
+        let mut plan = agreed(scene, team, Self::of_roles(scene, layout, changes, &lay_out))?;
+        let setup = &mut plan.setup;
+        let Setup { body, flock: Flock { neighbours, weights, rest, .. }, update, cells, .. } = setup;
+        let among = Among { body, neighbours, changes: &setup.changes, team };
+        let has_loads = setup.flock.forces.is_some();
+        among.agree(scene, (weights, has_loads, cells.as_ref()), (update, rest))?;
+        let conducts = setup.actions.iter_mut().filter_map(|action| match &mut action.what {
+            ActionKind::Follow(conduct) => Some(Arc::make_mut(conduct)),
+            ActionKind::Cut(_) => None,
+        });
+        let mut has_bonds = setup.flock.bonds.is_some();
+        for ((k, changed), conduct) in followed(scene).zip(conducts) {
+            let Conduct { weights, forces, rest, update, cells, fracture, .. } = conduct;
+            has_bonds |= fracture.is_some();
+            among
+                .agree(changed, (weights, forces.is_some(), cells.as_ref()), (update, rest))
+                .map_err(|error| refuse_keys(scene, k, &error))?;
+        }
+        places::around(scene, (body, cells.as_ref()), Some(team))?;
+        if has_bonds && u32::try_from(body.total()).is_err() {
             let message = "broken bonds are known by particles up to number 4,294,967,295";
             return Err(scene.refuse("body.shape", message, "use a wider spacing or a smaller shape"));
         }
-        make_cuts(&mut plan.setup, scene, |body, neighbours, found| {
-            of_all_parts(team, body, neighbours, found)
-        });
-        plan.agree_on_rest(team);
+        make_cuts(setup, scene, |body, neighbours, found| of_all_parts(team, body, neighbours, found));
         Ok(plan)
-    }
-
-    /// Refuses a material whose cells can move against each other, or all of them under a load.
-    fn require_held_together(&self, scene: &Scene, team: &Team) -> Result<(), SceneError> {
-        let Setup { body, flock, cells, changes, .. } = &self.setup;
-        let (Some(cells), Mean::Material { .. }) = (cells, scene.mean) else { return Ok(()) };
-        let incidence = cells.incidence(body.count());
-        let (part, linkage) = linkage(body, (cells, &incidence), team);
-        if flock.forces.is_some() {
-            let held = require_held(body, &incidence, (&part, &linkage), &held_axes(body, changes), team);
-            held.map_err(|mechanism| refuse_loose(scene, &mechanism))?;
-        }
-        let rigid = linkage.require_rigid(body.bounds());
-        rigid.map_err(|mechanism| weights::refuse(scene, &WeightsError::Mechanism(mechanism)))
-    }
-
-    /// Keeps rest offsets if any particle of the body needs one: those that stand at the ends of a part alone do.
-    fn agree_on_rest(&mut self, team: &Team) {
-        let Setup { body, flock, .. } = &mut self.setup;
-        let is_held = |i: usize| match &flock.weights {
-            Weights::Matrix(weights) => weights.held(i) != [false; 2],
-            _ => false,
-        };
-        let is_needed = |rest: &Vectors| body.owned().any(|i| rest.get(i) != [0.0; 2] || is_held(i));
-        let is_needed = team.any(flock.rest.as_ref().is_some_and(is_needed));
-        flock.rest = flock.rest.take().or_else(|| Some(Vectors::zeros(body.count()))).filter(|_| is_needed);
     }
 
     /// The part of a rank, planned without the others: what needs them is not checked.
@@ -147,10 +140,16 @@ impl Plan {
     /// # Errors
     /// As [`Plan::new`], but for that.
     pub(crate) fn of_part_alone(scene: &Scene, parting: &Parting, rank: usize) -> Result<Self, SceneError> {
-        Self::of_layout(scene, parting.lay_out(scene, rank)?, None)
+        let lay_out = |scene: &Scene| parting.lay_out(scene, rank);
+        Self::laid_out(scene, lay_out(scene)?, None, &lay_out)
     }
 
-    fn of_roles(scene: &Scene, layout: Layout, changes: Vec<RoleChange>) -> Result<Self, SceneError> {
+    fn of_roles(
+        scene: &Scene,
+        layout: Layout,
+        changes: Vec<RoleChange>,
+        lay_out: LayOut<'_>,
+    ) -> Result<Self, SceneError> {
         let following = Following::new(scene, &layout, &changes)?;
         let probes = probes(scene, &layout.body)?;
         // For all parts to find out.
@@ -158,7 +157,7 @@ impl Plan {
             places::around(scene, (&layout.body, layout.cells.as_ref()), None)?;
         }
         require_listable(scene, &layout.body)?;
-        let actions = actions(scene, &layout, &changes)?;
+        let actions = actions(scene, (&layout, &changes), lay_out)?;
         let Layout { body, neighbours, cells, outline, .. } = layout;
         let Following { weights, forces, update, loads, free_edge } = following;
         let resultant = |load: &Vectors| Resultant::of(body.reference.iter().zip(load.iter()));
@@ -244,21 +243,25 @@ impl Following {
     }
 }
 
+/// Lays the body, or the part of it, of a scene with other keys out.
+type LayOut<'a> = &'a dyn Fn(&Scene) -> Result<Layout, SceneError>;
+
 type Actions = Vec<Action<Arc<Conduct>>>;
 
-fn actions(scene: &Scene, layout: &Layout, changes: &[RoleChange]) -> Result<Actions, SceneError> {
+fn actions(
+    scene: &Scene,
+    (layout, changes): (&Layout, &[RoleChange]),
+    lay_out: LayOut<'_>,
+) -> Result<Actions, SceneError> {
     let action = |(k, action): (usize, &Action<Box<Scene>>)| {
         let what = match &action.what {
             ActionKind::Cut(cut) => ActionKind::Cut(*cut),
             ActionKind::Follow(changed) => {
-                let refuse = |message: String| {
-                    let help = "give these keys from the start instead";
-                    scene.refuse(&format!("actions[{k}].what.keys"), message, help)
-                };
-                let other = other_layout(scene, changed, layout).map_err(refuse)?;
+                let other = other_layout(scene, changed, layout, lay_out);
+                let other = other.map_err(|message| refuse_keys(scene, k, &message))?;
                 let layout = other.as_ref().unwrap_or(layout);
                 let following = Following::new(changed, layout, changes);
-                let following = following.map_err(|error| refuse(error.to_string()))?;
+                let following = following.map_err(|error| refuse_keys(scene, k, &error))?;
                 ActionKind::Follow(Arc::new(following.conduct(changed, layout)))
             }
         };
@@ -267,11 +270,21 @@ fn actions(scene: &Scene, layout: &Layout, changes: &[RoleChange]) -> Result<Act
     scene.actions.iter().enumerate().map(action).collect()
 }
 
+fn refuse_keys(scene: &Scene, action: usize, why: &impl ToString) -> SceneError {
+    let key = format!("actions[{action}].what.keys");
+    scene.refuse(&key, why.to_string(), "give these keys from the start instead")
+}
+
 /// The layout of a scene with other keys, where these concern cells and neighbours: the same particles and neighbours.
 ///
 /// # Errors
 /// A sentence that says why it cannot be.
-fn other_layout(scene: &Scene, changed: &Scene, layout: &Layout) -> Result<Option<Layout>, String> {
+fn other_layout(
+    scene: &Scene,
+    changed: &Scene,
+    layout: &Layout,
+    lay_out: LayOut<'_>,
+) -> Result<Option<Layout>, String> {
     let is_material = |scene: &Scene| matches!(scene.mean, Mean::Material { .. });
     let is_alike = scene.material == changed.material
         && scene.inclusions == changed.inclusions
@@ -281,7 +294,7 @@ fn other_layout(scene: &Scene, changed: &Scene, layout: &Layout) -> Result<Optio
     if is_alike {
         return Ok(None);
     }
-    let other = Layout::new(changed).map_err(|error| error.to_string())?;
+    let other = lay_out(changed).map_err(|error| error.to_string())?;
     let is_same = other.body.reference == layout.body.reference && other.neighbours == layout.neighbours;
     if is_same { Ok(Some(other)) } else { Err(OTHER_BODY.into()) }
 }
@@ -345,7 +358,7 @@ fn free_edge(scene: &Scene, layout: &Layout, loads: &[Load], held: &[[bool; 2]])
 }
 
 /// Components that are led or clamped from the start, shape \[count\]\[x, y\].
-fn held_axes(body: &Body, changes: &[RoleChange]) -> Vec<[bool; 2]> {
+pub(super) fn held_axes(body: &Body, changes: &[RoleChange]) -> Vec<[bool; 2]> {
     of_first_roles(changes, body.count(), |_, change| change.role.is_led())
 }
 
@@ -377,7 +390,7 @@ fn require_carried(
     held.map_err(|mechanism| refuse_loose(scene, &mechanism))
 }
 
-fn refuse_loose(scene: &Scene, mechanism: &Mechanism) -> SceneError {
+pub(super) fn refuse_loose(scene: &Scene, mechanism: &Mechanism) -> SceneError {
     let help = "clamp or lead at least two particles of every part, or components that keep it from moving";
     scene.refuse("roles", mechanism.to_string(), help)
 }
@@ -399,7 +412,7 @@ const OF_TURNED_CELLS: f64 = 0.75;
 
 /// The update as written; unless its damping is, a fitted body's is what its outline allows, and less where cells turn. Of a part
 /// all ranks find it together.
-fn update(
+pub(super) fn update(
     scene: &Scene,
     body: &Body,
     neighbours: &Neighbours,

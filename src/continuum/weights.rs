@@ -1,6 +1,7 @@
 //! Fixed weights of the neighbours, from what the scene says of them and of its material.
 
 use super::bulk_response::{self, gradient};
+use super::pieces::require_connected;
 use crate::flock::body::Body;
 use crate::flock::lattice::Site;
 use crate::flock::law::Weights;
@@ -10,6 +11,7 @@ use crate::flock::vectors::distance;
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
 use crate::material::weights::{MaterialWeights, WeightsError};
+use crate::ranks::Team;
 use crate::scene::{Scene, SceneError, Weights as FixedWeights};
 use crate::solve::affine_weights;
 
@@ -44,7 +46,11 @@ pub fn of_body(
             Ok(Weights::Scalar(listed_weights(values, &offsets, body, neighbours)))
         }
         Some(FixedWeights::Solved) => {
-            let solved = affine_weights::solve(&body.reference, neighbours, follows).map_err(|error| {
+            // Those at the ends of a part see too few.
+            let exact = body.exact();
+            let follows = follows.iter().enumerate().map(|(i, follows)| *follows && exact.contains(&i));
+            let follows: Vec<bool> = follows.collect();
+            let solved = affine_weights::solve(&body.reference, neighbours, &follows).map_err(|error| {
                 let help = "use a wider neighbourhood or a frame, or let a leader have this place";
                 scene.refuse("rule.weights", error.described(|i| format!("particle {}", body.id(i))), help)
             })?;
@@ -53,9 +59,12 @@ pub fn of_body(
         Some(FixedWeights::Gradient { length }) => {
             let gradient = gradient(scene, *length)?;
             bulk_response::require_damped(scene, &gradient)?;
-            let weights = gradient.of_body(body, neighbours);
-            require_joined(scene, body, neighbours, &weights)?;
-            Ok(Weights::Scalar(weights))
+            let weights = Weights::Scalar(gradient.of_body(body, neighbours));
+            // For all parts to find out.
+            if body.part.is_none() {
+                require_joined(scene, (body, neighbours, &weights), None)?;
+            }
+            Ok(weights)
         }
     }
 }
@@ -106,15 +115,23 @@ fn listed_weights(values: &[f64], offsets: &[Vec<Site>], body: &Body, neighbours
     all
 }
 
-/// Refuses a body that hangs together by neighbours of no weight alone: those across a gap.
-fn require_joined(
+/// Refuses a body that hangs together by neighbours of no weight alone: those across a gap that a second gradient sees over. Of a
+/// part all ranks find it together.
+pub(super) fn require_joined(
     scene: &Scene,
-    body: &Body,
-    neighbours: &Neighbours,
-    weights: &[f64],
+    (body, neighbours, weights): (&Body, &Neighbours, &Weights),
+    team: Option<&Team>,
 ) -> Result<(), SceneError> {
+    let (Some(FixedWeights::Gradient { .. }), Weights::Scalar(weights)) = (&scene.weights, weights) else {
+        return Ok(());
+    };
     let joined = |i: usize| neighbours.bonds(i).filter(|&b| weights[b] != 0.0).map(|b| neighbours.index[b]);
-    body.require_connected(&Neighbours::from_lists((0..body.count()).map(joined))).map_err(|error| {
+    let joined = Neighbours::from_lists((0..body.count()).map(joined));
+    let connected = match team {
+        None => body.require_connected(&joined),
+        Some(team) => require_connected(body, &joined, team),
+    };
+    connected.map_err(|error| {
         scene.refuse(
             "body.shape",
             error.to_string(),

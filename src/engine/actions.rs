@@ -83,7 +83,8 @@ impl Engine {
             (Some(bonds), Some((threshold, ghosts))) => (bonds.threshold, bonds.ghosts) = (threshold, ghosts),
             (Some(bonds), None) => bonds.threshold = None,
             (None, Some((threshold, ghosts))) => {
-                flock.bonds = Some(Bonds::new(threshold, ghosts, &flock.neighbours));
+                let bonds = flock.bonds.insert(Bonds::new(threshold, ghosts, &flock.neighbours));
+                bonds.owned = self.body.owned();
             }
             (None, None) => {}
         }

@@ -11,6 +11,7 @@
 //! some around them, and to gather is to receive these. What a rank finds, it finds of its own; sums over the whole body go
 //! through the ranks in their order.
 
+use std::collections::HashMap;
 use std::ops::{ControlFlow, Range};
 
 use super::Engine;
@@ -170,6 +171,27 @@ impl Engine {
         later.sort_unstable_by_key(|of| of[0]);
         let numbers = later.into_iter().map(|of| std::array::from_fn(|k| f64::from_bits(of[k + 1])));
         numbers.fold(chained.map(f64::from_bits), add)
+    }
+
+    /// The numbers of those particles of other parts that the particles of this one see, which the others know; none of a whole
+    /// body.
+    pub(crate) fn of_others<const N: usize>(
+        &self,
+        own: impl Fn(usize) -> [f64; N],
+    ) -> HashMap<usize, [f64; N]> {
+        let (Some(team), Some(domain)) = (self.parted(), self.sweep.domain()) else { return HashMap::new() };
+        let halo = domain.halo(0);
+        let words = |(rank, of): &(usize, Range<usize>)| {
+            (*rank, of.clone().flat_map(|i| own(i).map(f64::to_bits)).collect())
+        };
+        let sent: Vec<(usize, Vec<u64>)> = halo.sends.iter().map(words).collect();
+        let sizes: Vec<_> = halo.receives.iter().map(|(rank, of)| (*rank, N * of.len())).collect();
+        let received = team.swap(&sent, &sizes);
+        let numbers = |words: &[u64]| std::array::from_fn(|k| f64::from_bits(words[k]));
+        let of_rank = |((_, of), words): (&(usize, Range<usize>), &Vec<u64>)| -> Vec<_> {
+            of.clone().zip(words.chunks_exact(N).map(numbers)).collect()
+        };
+        halo.receives.iter().zip(&received).flat_map(of_rank).collect()
     }
 
     /// Whether it is so in any part of the body.

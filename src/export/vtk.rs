@@ -19,6 +19,7 @@
 //! base64 within the XML: a number costs 11 bytes, loses nothing, and the file stays well-formed, which raw appended
 //! data would not.
 
+use std::collections::HashMap;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::ops::Range;
@@ -130,7 +131,8 @@ impl VtkSeries {
             return self.write_pieces(engine, team);
         }
         let path = self.files.path(&Path::new(FOLDER).join(file_name(engine.step())));
-        write_frame(&path, engine, self.material.as_ref()).map_err(ExportError::io("write", &path))?;
+        let values = Values::of(engine, self.material.as_ref());
+        write_frame(&path, &values).map_err(ExportError::io("write", &path))?;
         self.frames.push((engine.step(), None));
         Ok(())
     }
@@ -138,8 +140,10 @@ impl VtkSeries {
     fn write_pieces(&mut self, engine: &Engine, team: &Team) -> Result<(), ExportError> {
         let frame = (engine.step(), Some(team.count()));
         let list = &self.paths(&[frame])[0];
-        write_own_piece(list.parent(), engine, team)?;
-        write_file(list, list_of_pieces(engine.step(), team.count()))?;
+        let material = self.material.as_ref();
+        write_own_piece((list.parent(), team), engine, material)?;
+        let has_stresses = material.is_some() && engine.cells().is_some();
+        write_file(list, list_of_pieces(engine.step(), team.count(), has_stresses))?;
         self.frames.push(frame);
         Ok(())
     }
@@ -181,28 +185,35 @@ fn piece_name(step: usize, rank: usize) -> String {
     format!("step_{step:06}_{rank:04}.vtu")
 }
 
-/// Writes this rank's piece of a frame into the folder of the first rank, which has to be there for all of them; to be called
-/// by all ranks but the first while that one [writes](VtkSeries::write) the frame.
+/// Writes this rank's piece of a frame, with the stress in a body of this material, into the folder of the first rank, which has
+/// to be there for all of them; to be called by all ranks but the first while that one [writes](VtkSeries::write) the frame.
 ///
 /// # Errors
 /// A piece that cannot be written, by any rank.
-pub fn write_piece(engine: &Engine, team: &Team) -> Result<(), ExportError> {
-    write_own_piece(None, engine, team)
+pub fn write_piece(engine: &Engine, team: &Team, material: Option<&Elastic>) -> Result<(), ExportError> {
+    write_own_piece((None, team), engine, material)
 }
 
-fn write_own_piece(folder: Option<&Path>, engine: &Engine, team: &Team) -> Result<(), ExportError> {
+fn write_own_piece(
+    (folder, team): (Option<&Path>, &Team),
+    engine: &Engine,
+    material: Option<&Elastic>,
+) -> Result<(), ExportError> {
     let name = |rank: usize| piece_name(engine.step(), rank);
-    let write = |path: &Path| write_frame(path, engine, None).map_err(ExportError::io("write", path));
+    let values = Values::of(engine, material);
+    let write = |path: &Path| write_frame(path, &values).map_err(ExportError::io("write", path));
     write_each(folder, name, team, write)
 }
 
 /// What all pieces of a frame have in common, and their names.
-fn list_of_pieces(step: usize, ranks: usize) -> String {
+fn list_of_pieces(step: usize, ranks: usize, has_stresses: bool) -> String {
     let array = |kind: &str, name: &str| format!("<PDataArray type=\"{kind}\" Name=\"{name}\"/>\n");
     let three = |name: &str, more: &str| {
         format!("<PDataArray type=\"Float64\" Name=\"{name}\" NumberOfComponents=\"3\"{more}/>\n")
     };
     let tensor = " ComponentName0=\"xx\" ComponentName1=\"yy\" ComponentName2=\"xy\"";
+    let of_stresses = [three("stress", tensor), array("Float64", "von_mises")].concat();
+    let stresses = if has_stresses { of_stresses } else { String::new() };
     let points = [
         array("UInt8", GHOSTS),
         array("Int64", "id"),
@@ -212,8 +223,9 @@ fn list_of_pieces(step: usize, ranks: usize) -> String {
         array("Float64", "pe2"),
         three("strain", tensor),
         array("Float64", "rotation"),
+        stresses.clone(),
     ];
-    let cells = [array("UInt8", "broken"), array("Float64", "stretch")];
+    let cells = [array("UInt8", "broken"), array("Float64", "stretch"), stresses];
     let pieces = (0..ranks).map(|rank| format!("<Piece Source=\"{}\"/>\n", piece_name(step, rank)));
     let attributes =
         "type=\"PUnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\"";
@@ -229,10 +241,10 @@ fn list_of_pieces(step: usize, ranks: usize) -> String {
     )
 }
 
-fn write_frame(path: &Path, engine: &Engine, material: Option<&Elastic>) -> io::Result<()> {
+fn write_frame(path: &Path, values: &Values<'_>) -> io::Result<()> {
     let mut out = create_buffered(path)?;
+    let engine = values.engine;
     let grid = Grid::of(engine);
-    let stresses = material.and_then(|elastic| Stresses::at_present(engine, elastic));
     let points = grid.points.len();
     writeln!(out, "<?xml version=\"1.0\"?>")?;
     let attributes = "type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\"";
@@ -241,8 +253,8 @@ fn write_frame(path: &Path, engine: &Engine, material: Option<&Elastic>) -> io::
     writeln!(out, "<!-- step {}; role: {roles} -->", engine.step())?;
     writeln!(out, "<UnstructuredGrid>")?;
     writeln!(out, "<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{}\">", grid.count())?;
-    write_point_data(&mut out, engine, &grid.points, stresses.as_ref())?;
-    grid.write_data(&mut out, engine, stresses.as_ref())?;
+    write_point_data(&mut out, values, &grid.points)?;
+    grid.write_data(&mut out, values)?;
     writeln!(out, "<Points>")?;
     let places = grid.points.clone().map(|row| engine.present().get(engine.body().in_row(row)));
     let places = places.flat_map(|[x, y]| [x, y, 0.0]);
@@ -253,12 +265,59 @@ fn write_frame(path: &Path, engine: &Engine, material: Option<&Elastic>) -> io::
     out.flush()
 }
 
-fn write_point_data(
-    out: &mut impl Write,
-    engine: &Engine,
-    rows: &Range<usize>,
-    stresses: Option<&Stresses>,
-) -> io::Result<()> {
+/// Numbers of particles that are found from those around them: what stands around those of other parts the others know.
+struct Values<'a> {
+    engine: &'a Engine,
+    stresses: Option<Stresses>,
+    /// Energies, strain, and stress of particles of other parts.
+    others: HashMap<usize, [f64; 10]>,
+}
+
+impl<'a> Values<'a> {
+    /// At the engine's present places; of a body in parts found by all ranks together.
+    fn of(engine: &'a Engine, material: Option<&Elastic>) -> Self {
+        let stresses = material.and_then(|elastic| Stresses::at_present(engine, elastic));
+        let mut values = Self { engine, stresses, others: HashMap::new() };
+        values.others = engine.of_others(|i| {
+            let ([pe1, pe2], [a, b, c, d]) = (values.energies(i), values.strain(i));
+            let [xx, yy, xy, von_mises] = values.stress(i);
+            [pe1, pe2, a, b, c, d, xx, yy, xy, von_mises]
+        });
+        values
+    }
+
+    /// Of another part those from this place on, of this one its `own`.
+    fn known<const N: usize>(&self, particle: usize, from: usize, own: impl Fn() -> [f64; N]) -> [f64; N] {
+        match self.others.get(&particle) {
+            Some(all) => std::array::from_fn(|k| all[from + k]),
+            None => own(),
+        }
+    }
+
+    /// PE1 \[length^2\] and PE2 \[length\].
+    fn energies(&self, particle: usize) -> [f64; 2] {
+        self.known(particle, 0, || [self.engine.pe1(particle), self.engine.pe2(particle)])
+    }
+
+    /// Components and rotation, NaN for a particle that sees too few \[1, rad\].
+    fn strain(&self, particle: usize) -> [f64; 4] {
+        self.known(particle, 2, || {
+            self.engine.strain(particle).map_or([f64::NAN; 4], |Strain { components, rotation, .. }| {
+                let [xx, yy, xy] = components;
+                [xx, yy, xy, rotation]
+            })
+        })
+    }
+
+    /// Components and von Mises stress, NaN for a particle in no whole cell \[force / length^2\].
+    fn stress(&self, particle: usize) -> [f64; 4] {
+        let own = || self.stresses.as_ref().and_then(|stresses| stresses.particles[particle]);
+        self.known(particle, 6, || own().map_or([f64::NAN; 4], |stress| with_von_mises(&stress)))
+    }
+}
+
+fn write_point_data(out: &mut impl Write, values: &Values<'_>, rows: &Range<usize>) -> io::Result<()> {
+    let engine = values.engine;
     let (points, body) = (rows.len(), engine.body());
     let rows = || rows.clone().map(|row| body.in_row(row));
     writeln!(out, "<PointData Scalars=\"pe1\" Vectors=\"displacement\">")?;
@@ -272,23 +331,16 @@ fn write_point_data(
     let moved = rows().map(|i| (engine.present().get(i), body.reference.get(i)));
     let displacement = moved.flat_map(|(now, initial)| [now[0] - initial[0], now[1] - initial[1], 0.0]);
     vectors(out, "displacement", points, displacement)?;
-    floats(out, "pe1", points, rows().map(|i| engine.pe1(i)))?;
-    floats(out, "pe2", points, rows().map(|i| engine.pe2(i)))?;
+    floats(out, "pe1", points, rows().map(|i| values.energies(i)[0]))?;
+    floats(out, "pe2", points, rows().map(|i| values.energies(i)[1]))?;
     let particles: Vec<usize> = rows().collect();
-    let strains: Vec<Option<Strain>> = particles.into_par_iter().map(|i| engine.strain(i)).collect();
-    let components = |strain: &Option<Strain>| strain.map_or([f64::NAN; 3], |strain| strain.components);
-    plane_tensors(out, "strain", points, strains.iter().map(components))?;
-    let rotation = |strain: &Option<Strain>| strain.map_or(f64::NAN, |strain| strain.rotation);
-    floats(out, "rotation", points, strains.iter().map(rotation))?;
-    if let Some(stresses) = stresses {
-        write_stresses(out, points, rows().map(|i| at_particle(stresses, i)))?;
+    let strains: Vec<[f64; 4]> = particles.into_par_iter().map(|i| values.strain(i)).collect();
+    plane_tensors(out, "strain", points, strains.iter().map(|&[xx, yy, xy, _]| [xx, yy, xy]))?;
+    floats(out, "rotation", points, strains.iter().map(|strain| strain[3]))?;
+    if values.stresses.is_some() {
+        write_stresses(out, points, rows().map(|i| values.stress(i)))?;
     }
     writeln!(out, "</PointData>")
-}
-
-/// Components and von Mises stress, NaN for a particle in no whole cell \[force / length^2\].
-fn at_particle(stresses: &Stresses, particle: usize) -> [f64; 4] {
-    stresses.particles[particle].map_or([f64::NAN; 4], |stress| with_von_mises(&stress))
 }
 
 fn with_von_mises(stress: &StressState) -> [f64; 4] {
@@ -341,12 +393,8 @@ impl<'a> Grid<'a> {
         self.vertices.len() + self.bonds.len() + self.polygons.len()
     }
 
-    fn write_data(
-        &self,
-        out: &mut impl Write,
-        engine: &Engine,
-        stresses: Option<&Stresses>,
-    ) -> io::Result<()> {
+    fn write_data(&self, out: &mut impl Write, values: &Values<'_>) -> io::Result<()> {
+        let Values { engine, stresses, .. } = values;
         let bonds = engine.flock().bonds.as_ref();
         let is_broken = |&(bond, _): &(usize, _)| bonds.is_some_and(|bonds| bonds.is_broken(bond));
         let length = |of: &Vectors, [a, b]: [u32; 2]| distance(of.get(a as usize), of.get(b as usize));
@@ -364,9 +412,9 @@ impl<'a> Grid<'a> {
         floats(out, "stretch", cells, before.chain(self.bonds.iter().map(stretch)).chain(after))?;
         if let Some(stresses) = stresses {
             let rows = self.vertices.clone().map(|row| engine.body().in_row(row));
-            let particles = rows.map(|i| at_particle(stresses, i));
+            let particles = rows.map(|i| values.stress(i));
             let between = |&(_, pair): &(usize, [u32; 2])| {
-                let [a, b] = pair.map(|end| at_particle(stresses, end as usize));
+                let [a, b] = pair.map(|end| values.stress(end as usize));
                 std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
             };
             let own: Vec<_> =

@@ -41,6 +41,25 @@ fn the_first_rank_speaks_for_all() {
 }
 
 #[test]
+fn the_first_rank_speaks_of_a_command_line_that_none_can_read_and_prints_the_help() {
+    for (arguments, code, words) in [
+        (&["run", "tension", "--stepps", "3"][..], 2, "--stepps"),
+        (&["run", "--help"], 0, "Usage"),
+        (&["rum"], 2, "rum"),
+    ] {
+        for launcher in LAUNCHERS {
+            let said = |rank: &str| {
+                let (output, _) = as_rank(rank, "4", launcher, arguments);
+                (output.status.code(), text(&output.stdout) + &text(&output.stderr))
+            };
+            let (found, first) = said("0");
+            assert!(found == Some(code) && first.contains(words), "{first}");
+            assert_eq!(said("2"), (Some(0), String::new()), "{arguments:?}");
+        }
+    }
+}
+
+#[test]
 fn studies_that_would_write_over_each_other_refuse_too() {
     for arguments in [["compare", "beam"], ["swarm", "gap"], ["stability", "tension"]] {
         let (output, left) = as_rank("0", "2", LAUNCHERS[1], &arguments);

@@ -20,9 +20,11 @@ use flockform::solve::interrupt::Interrupt;
 
 use scenes::{load, planned};
 
+mod changed;
 mod parts;
 #[path = "../common/scenes.rs"]
 mod scenes;
+mod written;
 
 /// Everything that a run leaves, to the bit.
 #[derive(Clone, Debug, PartialEq)]

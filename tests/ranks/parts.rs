@@ -163,11 +163,11 @@ fn probed(scene: &Scene) -> (Vec<ProbeSeries>, (String, Vec<[u64; 3]>)) {
     (probes, measured(scene, &outcome.engine))
 }
 
-fn assert_parted_the_same(name: &str, sets: &[&str], every: usize) {
+pub(super) fn assert_parted_the_same(name: &str, sets: &[&str], every: usize) {
     assert_scene_parted_the_same(&load(name, sets), &format!("{name} {sets:?}"), every);
 }
 
-fn assert_scene_parted_the_same(scene: &Scene, name: &str, every: usize) {
+pub(super) fn assert_scene_parted_the_same(scene: &Scene, name: &str, every: usize) {
     let (probes, (readings, stresses)) = probed(scene);
     let mut expected = End { seen: Vec::new(), probes, readings, ..alone(scene, every) };
     expected.places.extend(stresses.into_iter().flatten());
@@ -280,7 +280,7 @@ fn what_is_found_on_the_way_of_a_body_in_parts_is_what_a_run_alone_finds() {
     }
 }
 
-const PLATE: &str = r#"
+pub(super) const PLATE: &str = r#"
 title = "A plate in parts"
 lattice = { kind = "square", spacing = 1.0 }
 rule = { mean = { kind = "material" } }
@@ -305,7 +305,7 @@ motion = { kind = "keyframes", frames = [{ step = 40, displacement = [1.5, 0.4] 
 probes = [1, 30, 61, 100]
 "#;
 
-fn plate(text: &str, sets: &[&str]) -> Scene {
+pub(super) fn plate(text: &str, sets: &[&str]) -> Scene {
     let all: Vec<String> = sets.iter().map(|&set| set.to_owned()).collect();
     Scene::parse("plate", "plate", text, &all, None).unwrap_or_else(|error| panic!("{sets:?}: {error}"))
 }
@@ -462,7 +462,7 @@ fn loads_on_a_body_in_parts_are_those_on_one_laid_out_as_a_whole() {
 }
 
 /// What a scene is refused for as a whole and in parts, on every rank: something that says `what`.
-fn assert_refused_the_same(scene: &Scene, what: &str) {
+pub(super) fn assert_refused_the_same(scene: &Scene, what: &str) {
     assert_eq!(laid_out_whole_for(scene), None);
     let expected = Plan::new(scene).expect_err(what).to_string();
     assert!(expected.contains(what), "{what}: {expected}");

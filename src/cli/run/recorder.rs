@@ -148,7 +148,7 @@ impl<'a> Recorder<'a> {
         let start = Instant::now();
         let written = match (&mut self.frames, engine.parted()) {
             (Some(frames), _) => frames.write(engine),
-            (None, Some(team)) => write_piece(engine, team),
+            (None, Some(team)) => write_piece(engine, team, self.scene.material.as_ref()),
             (None, None) => Ok(()),
         };
         self.failure = written.err();

@@ -1,0 +1,290 @@
+//! What the ranks of a body in parts write together is what a run alone writes.
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::Duration;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use flockform::continuum::digest::{digest, digest_of_parts};
+use flockform::continuum::parts::laid_out_whole_for;
+use flockform::continuum::plan::Plan;
+use flockform::continuum::record::LoadStep;
+use flockform::continuum::run::run_shared;
+use flockform::engine::Engine;
+use flockform::engine::observer::Observer;
+use flockform::engine::state::EngineState;
+use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
+use flockform::export::figures::Formats;
+use flockform::export::{Drawing, OutputFolder, Results, Timings, VtkSeries, write_all, write_piece};
+use flockform::ranks::Team;
+use flockform::scene::{LoadSteps, Scene};
+use resvg::usvg::roxmltree::{Document, Node};
+
+use super::on_ranks;
+use super::parts::{PLATE, plate};
+use super::scenes::planned;
+
+/// Writes rows of `load.csv` and frames, as a run does, and may leave a checkpoint, with which it ends.
+struct Writer<'a> {
+    scene: &'a Scene,
+    team: Option<&'a Team>,
+    digest: u64,
+    /// Of the rank that writes.
+    folder: Option<&'a OutputFolder>,
+    frames: Option<VtkSeries>,
+    rows: Vec<LoadStep>,
+    leave_at: Option<usize>,
+}
+
+impl Writer<'_> {
+    fn every(&self) -> usize {
+        match self.scene.load_steps {
+            Some(LoadSteps::Stepped { every, .. }) => every,
+            _ => self.scene.record.vtk_every,
+        }
+    }
+
+    fn measure(&mut self, engine: &Engine) {
+        let elastic = self.scene.material.as_ref().filter(|_| self.scene.load_steps.is_some());
+        self.rows.extend(elastic.and_then(|elastic| LoadStep::of(engine, elastic)));
+    }
+
+    fn leave(&self, engine: &Engine, residual: f64) {
+        let asked = RunRequest { scene: "plate".into(), set: Vec::new(), force: false };
+        let state = (EngineState::of(engine), residual);
+        let recorded = (&[][..], &[][..], &self.rows[..], None);
+        let mut left =
+            Checkpoint::new((&asked, self.scene, self.digest), state, recorded, Duration::default());
+        if let Some(team) = self.team {
+            let first = engine.body().index_from(engine.body().owned().start);
+            let folder = self.folder.map(OutputFolder::folder);
+            left = left.with_parts(folder, (first, team), Ok(())).expect("written");
+        }
+        self.folder.iter().for_each(|folder| left.write(folder.folder()).expect("written"));
+    }
+}
+
+impl Observer for Writer<'_> {
+    fn next(&mut self, step: usize) -> usize {
+        (step / self.every() + 1) * self.every()
+    }
+
+    fn see(&mut self, engine: &Engine, residual: f64) -> ControlFlow<()> {
+        self.measure(engine);
+        match (&mut self.frames, self.team) {
+            (Some(frames), _) => frames.write(engine).expect("written"),
+            (None, Some(team)) if self.scene.record.vtk_every > 0 => {
+                write_piece(engine, team, self.scene.material.as_ref()).expect("written");
+            }
+            _ => {}
+        }
+        if self.leave_at != Some(engine.step()) {
+            return ControlFlow::Continue(());
+        }
+        self.leave(engine, residual);
+        ControlFlow::Break(())
+    }
+}
+
+/// Runs a scene, or goes on with it from the checkpoint in a folder, and writes what comes of it into `out`; alone, or as a rank.
+fn write(scene: &Scene, team: Option<&Team>, out: &Path, from: Option<&Path>, leave_at: Option<usize>) {
+    let plan = team.map_or_else(|| planned(scene), |team| Plan::of_part(scene, team).expect("fits"));
+    let digest = team.map_or_else(|| digest(&plan), |team| digest_of_parts(&plan, team));
+    let left = from.map(|from| {
+        let mut left = Checkpoint::read(from).expect("readable").expect("there");
+        left.require_of(from, scene, digest).expect("of this scene");
+        left.join(from, &plan.setup).expect("of this body");
+        left
+    });
+    let rows = left.iter().flat_map(|left| left.load_steps.to_vec()).collect();
+    let from = left.map(|left| (left.engine, left.residual));
+    let is_writing = team.is_none_or(Team::is_first);
+    let folder = is_writing.then(|| OutputFolder::create(out, true).expect("created"));
+    let frames = folder.as_ref().filter(|_| scene.record.vtk_every > 0);
+    let frames =
+        frames.map(|folder| VtkSeries::create(folder).expect("created").with_material(scene.material));
+    let folder_of = folder.as_ref();
+    let mut writer = Writer { scene, team, digest, folder: folder_of, frames, rows, leave_at };
+    let outcome = run_shared(plan, from, team, &mut writer).expect("can be shared");
+    if writer.rows.last().is_some_and(|last| last.step != outcome.engine.step()) {
+        writer.measure(&outcome.engine);
+    }
+    let load_steps = &writer.rows[..];
+    let timings = Timings::default();
+    let results = Results { scene, outcome: &outcome, snapshots: &[], probes: &[], load_steps, timings };
+    let drawing = Drawing { formats: Formats::None, ..Drawing::default() };
+    write_all(folder_of, &results, drawing).expect("written");
+    if let Some(frames) = writer.frames {
+        frames.finish().expect("written");
+    }
+    if let Some(folder) = folder {
+        folder.commit().expect("committed");
+    }
+}
+
+/// The table of the loads, and the summary but for what depends on the clock or on how the work was shared.
+fn tables(folder: &Path) -> [String; 3] {
+    let read = |file: &str| std::fs::read_to_string(folder.join(file)).expect(file);
+    let summary: serde_json::Value = serde_json::from_str(&read("summary.json")).expect("JSON");
+    let mut summary = summary.as_object().expect("an object").clone();
+    assert!(["timings", "share_swept"].iter().all(|key| summary.remove(*key).is_some()));
+    [read("load.csv"), read("final.csv"), format!("{summary:#?}")]
+}
+
+fn assert_written_the_same(scene: &Scene, leave_at: usize) {
+    assert_eq!(laid_out_whole_for(scene), None);
+    let parent = tempfile::tempdir().expect("a folder");
+    let of = |name: &str| parent.path().join(name);
+    let in_parts = |ranks: usize, out: &Path, from: Option<&Path>, leave_at: Option<usize>| {
+        on_ranks(ranks, |team| write(scene, Some(&team), out, from, leave_at));
+    };
+    write(scene, None, &of("alone"), None, None);
+    let expected = tables(&of("alone"));
+    assert!(expected[0].lines().count() > 5, "{}", expected[0]);
+    for ranks in [1, 2, 3, 5] {
+        in_parts(ranks, &of("parts"), None, None);
+        assert_eq!(tables(&of("parts")), expected, "{ranks} parts");
+    }
+    in_parts(3, &of("left"), None, Some(leave_at));
+    assert!(of("left").join(checkpoint::FILE).is_file());
+    for ranks in [2, 4] {
+        in_parts(ranks, &of("resumed"), Some(&of("left")), None);
+        assert_eq!(tables(&of("resumed")), expected, "3 parts, then {ranks}");
+    }
+    write(scene, None, &of("resumed"), Some(&of("left")), None);
+    assert_eq!(tables(&of("resumed")), expected, "3 parts, then alone");
+    write(scene, None, &of("left"), None, Some(leave_at));
+    in_parts(2, &of("resumed"), Some(&of("left")), None);
+    assert_eq!(tables(&of("resumed")), expected, "alone, then 2 parts");
+}
+
+const SEVERAL: &str = "loads=[{kind=\"pressure\",region={kind=\"outline\",hole=1},pressure=9.0},\
+     {kind=\"force\",region={kind=\"disc\",centre=[17.0,6.0],radius=2.0},force=[0.5,-1.5]},\
+     {kind=\"body\",force=[0.1,-0.7]}]";
+
+#[test]
+fn what_a_growing_load_does_to_a_body_in_parts_is_what_it_does_to_one_alone() {
+    let fitted = "body.outline=\"fitted\"";
+    let rotates = "rule.mean={kind=\"material\",rotation=\"corotated\"}";
+    let ramp = "load_steps={ramp={steps=30},every=7}";
+    let paper = ["rule.mean.kind=\"barycentre\"", "neighbours={kind=\"second\"}"];
+    for sets in [
+        &[SEVERAL, ramp][..],
+        &[SEVERAL, ramp, fitted],
+        &[SEVERAL, ramp, rotates],
+        &[SEVERAL, ramp, "stop.tolerance=1e-3"],
+        &["load_steps={every=11}", fitted],
+        &[&paper[..], &["load_steps={every=11}"]].concat(),
+    ] {
+        let sets = [&["record.probes=[]"], sets].concat();
+        let scene = plate(PLATE, &sets);
+        let every = if sets.contains(&"load_steps={every=11}") { 11 } else { 7 };
+        assert_written_the_same(&scene, 2 * every);
+    }
+}
+
+/// What stands in a file of VTK of each of its particles, by their ids, and of each of its cells, by their kind and the ids of
+/// their corners: bits of each array.
+#[derive(Default)]
+struct Frame {
+    particles: BTreeMap<i64, BTreeMap<String, Vec<u64>>>,
+    cells: BTreeMap<(u64, Vec<i64>), BTreeMap<String, Vec<u64>>>,
+    /// How many cells there are in all pieces.
+    count: usize,
+}
+
+const GHOSTS: &str = "vtkGhostType";
+
+impl Frame {
+    fn add(&mut self, path: &Path) {
+        let text = std::fs::read_to_string(path).expect("readable");
+        let document = Document::parse(&text).expect("well-formed");
+        let part = |name: &str| document.descendants().find(|node| node.has_tag_name(name)).expect("there");
+        let arrays = |name: &str| part(name).children().filter(Node::is_element).map(array).collect();
+        let [points, data, cells]: [BTreeMap<String, Vec<Vec<u64>>>; 3] =
+            ["PointData", "CellData", "Cells"].map(arrays);
+        let ids: Vec<i64> = points["id"].iter().map(|id| id[0] as i64).collect();
+        let of = |arrays: &BTreeMap<String, Vec<Vec<u64>>>, k: usize| -> BTreeMap<String, Vec<u64>> {
+            let own = |(name, values): (&String, &Vec<Vec<u64>>)| (name.clone(), values[k].clone());
+            arrays.iter().filter(|(name, _)| *name != GHOSTS).map(own).collect()
+        };
+        for (k, &id) in ids.iter().enumerate() {
+            // Points of other pieces have the same values there.
+            let found = of(&points, k);
+            let known = self.particles.entry(id).or_insert_with(|| found.clone());
+            assert_eq!(*known, found, "particle {id}");
+        }
+        let mut begin = 0;
+        for k in 0..cells["offsets"].len() {
+            let end = cells["offsets"][k][0] as usize;
+            let corners = &cells["connectivity"][begin..end];
+            let mut corners: Vec<i64> = corners.iter().map(|point| ids[point[0] as usize]).collect();
+            corners.sort_unstable();
+            self.cells.insert((cells["types"][k][0], corners), of(&data, k));
+            (begin, self.count) = (end, self.count + 1);
+        }
+    }
+}
+
+/// Name and values of an array, each as the bits of its components.
+fn array(node: Node<'_, '_>) -> (String, Vec<Vec<u64>>) {
+    let bytes = STANDARD.decode(node.text().expect("contents").trim()).expect("base64");
+    let size = if node.attribute("type") == Some("UInt8") { 1 } else { 8 };
+    let word = |of: &[u8]| of.iter().rev().fold(0, |word: u64, byte| word << 8 | u64::from(*byte));
+    let words: Vec<u64> = bytes[8..].chunks_exact(size).map(word).collect();
+    let components = node.attribute("NumberOfComponents").map_or(1, |n| n.parse().expect("a number"));
+    let name = node.attribute("Name").expect("a name").to_owned();
+    (name, words.chunks_exact(components).map(<[u64]>::to_vec).collect())
+}
+
+/// Names of the arrays of particles and cells.
+fn names(text: &str, [particles, cells]: [&str; 2]) -> [Vec<String>; 2] {
+    let document = Document::parse(text).expect("well-formed");
+    [particles, cells].map(|part| {
+        let part = document.descendants().find(|node| node.has_tag_name(part)).expect("there");
+        part.children().filter_map(|node| node.attribute("Name").map(str::to_owned)).collect()
+    })
+}
+
+#[test]
+fn frames_of_a_body_in_parts_are_those_of_a_run_alone_with_their_stresses() {
+    let fitted = "body.outline=\"fitted\"";
+    let frames = ["record={probes=[],vtk_every=20}", "stop.steps=40"];
+    let paper = ["rule.mean.kind=\"barycentre\"", "neighbours={kind=\"second\"}"];
+    let torn = "fracture={stretch=1.1,ghosts=\"none\"}";
+    for sets in [
+        &[SEVERAL][..],
+        &[SEVERAL, fitted],
+        &[SEVERAL, fitted, "lattice={kind=\"hexagonal\",spacing=1.0}"],
+        &["lattice={kind=\"honeycomb\",spacing=1.0}"],
+        &["material.poisson=0.49", "rule.mean={kind=\"material\",rotation=\"corotated\"}"],
+        &paper,
+        &[&paper[..], &[torn]].concat(),
+    ] {
+        let scene = plate(PLATE, &[&frames[..], sets].concat());
+        let parent = tempfile::tempdir().expect("a folder");
+        let [alone, parts] = ["alone", "parts"].map(|name| parent.path().join(name));
+        write(&scene, None, &alone, None, None);
+        for ranks in [1, 2, 3, 5] {
+            on_ranks(ranks, |team| write(&scene, Some(&team), &parts, None, None));
+            for step in [0, 20, 40] {
+                let what = format!("{sets:?}, step {step} in {ranks} parts");
+                let (mut expected, mut found) = (Frame::default(), Frame::default());
+                expected.add(&alone.join(format!("steps/step_{step:06}.vtu")));
+                let piece = |rank: usize| parts.join(format!("steps/step_{step:06}_{rank:04}.vtu"));
+                (0..ranks).for_each(|rank| found.add(&piece(rank)));
+                assert!(found.particles == expected.particles, "{what}: particles");
+                assert!(found.cells == expected.cells, "{what}: cells");
+                assert_eq!((found.count, expected.count), (expected.count, found.cells.len()), "{what}");
+                let first = expected.particles.values().next().expect("a particle");
+                assert!(first.contains_key("stress") && first.contains_key("von_mises"), "{what}");
+                let list = parts.join(format!("steps/step_{step:06}.pvtu"));
+                let [list, piece] = [list, piece(0)].map(|path| std::fs::read_to_string(path).expect("text"));
+                let listed = names(&list, ["PPointData", "PCellData"]);
+                assert_eq!(listed, names(&piece, ["PointData", "CellData"]), "{what}");
+            }
+        }
+    }
+}
