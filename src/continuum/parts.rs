@@ -15,7 +15,7 @@ use crate::flock::lattice::Lattice;
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::outlay::{Census, Outlay, cell_width};
 use crate::flock::part::{AlongOutline, Extent, Part};
-use crate::flock::rules::Mean;
+use crate::flock::rules::{Mean, Rotation};
 use crate::geometry::partition::Partition;
 use crate::material::boundary::Boundary;
 use crate::material::cells::{Cells, templates};
@@ -41,7 +41,7 @@ pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
         (matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. }), "neighbours.kind"),
         (weights, "rule.weights"),
         (scene.update.order == Order::Sequential, "update.order"),
-        (scene.equilibrium.is_some(), "equilibrium"),
+        (scene.equilibrium.is_some() && !is_solved_in_parts(scene), "equilibrium"),
         (scene.load_steps.is_some(), "load_steps"),
         (scene.actions.iter().any(|action| !action.is_cut()), "actions"),
     ];
@@ -51,6 +51,16 @@ pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
     };
     let key = keys.into_iter().find(|(is, _)| *is).map(|(_, key)| key.to_owned());
     key.or_else(|| scene.roles.iter().enumerate().find_map(of_role))
+}
+
+/// Whether the equilibrium that a scene asks for can be found where no rank has the whole: as a linear system, of particles that
+/// all stand at sites of the lattice.
+fn is_solved_in_parts(scene: &Scene) -> bool {
+    let is_linear = !matches!(scene.mean, Mean::Material { rotation: Rotation::Corotated });
+    let is_chosen = scene.equilibrium.is_some_and(|asked| asked.accuracy.is_some());
+    // A shape that cannot be laid out is refused later.
+    let is_cut = || source(scene).is_ok_and(|(fitted, _)| fitted.is_some_and(|fitted| !fitted.is_whole));
+    is_linear && !is_chosen && !(scene.is_fitted && is_cut())
 }
 
 /// Which columns of a body are whose.

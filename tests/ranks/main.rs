@@ -6,7 +6,7 @@ use std::thread;
 
 use flockform::continuum::equilibrium::{run_to_equilibrium_shared, run_to_equilibrium_watched};
 use flockform::continuum::plan::Plan;
-use flockform::continuum::run::{Outcome, SharedError, require_shareable, run_shared, run_watched};
+use flockform::continuum::run::{Outcome, SharedError, require_shareable, run_shared};
 use flockform::continuum::shares::{Exchanged, Shares};
 use flockform::engine::Engine;
 use flockform::engine::observer::Observer;
@@ -21,6 +21,7 @@ use flockform::solve::interrupt::Interrupt;
 use scenes::{load, planned};
 
 mod parts;
+mod rest;
 #[path = "../common/scenes.rs"]
 mod scenes;
 
@@ -103,7 +104,7 @@ fn on_ranks<T: Send>(count: usize, work: impl Fn(Team) -> T + Sync) -> Vec<T> {
 
 fn alone(scene: &Scene, every: usize) -> End {
     let mut looks = Looks::every(every);
-    let outcome = run_watched(planned(scene), &mut looks);
+    let outcome = run_to_equilibrium_watched(scene, planned(scene), &mut looks).expect("an end");
     End::of(&outcome, looks.seen)
 }
 

@@ -3,11 +3,12 @@
 use std::ops::ControlFlow;
 
 use flockform::continuum::digest::{digest, digest_of_parts};
+use flockform::continuum::equilibrium::{run_to_equilibrium_shared, run_to_equilibrium_watched};
 use flockform::continuum::mechanics::{Mechanics, Stresses};
 use flockform::continuum::parts::laid_out_whole_for;
 use flockform::continuum::places::at_places;
 use flockform::continuum::plan::Plan;
-use flockform::continuum::run::{run_shared, run_watched};
+use flockform::continuum::run::{Outcome, run_shared};
 use flockform::engine::Engine;
 use flockform::engine::observer::EachStep;
 use flockform::engine::probes::ProbeSeries;
@@ -18,6 +19,7 @@ use flockform::flock::law::Weights;
 use flockform::flock::vectors::Vectors;
 use flockform::material::stress::StressState;
 use flockform::scene::Scene;
+use flockform::solve::equilibrium::Solved;
 
 use super::scenes::{load, planned};
 use super::{End, Looks, alone, on_ranks};
@@ -77,9 +79,10 @@ fn parted(scene: &Scene, every: usize, ranks: usize, from: Option<&KeptParts>) -
             plan.setup.probes.iter_mut().for_each(|own| own.clone_from(probes));
             (EngineState::of_pieces(parts, &plan.setup).expect("of this body"), *residual)
         });
-        let outcome = run_shared(plan, from, &team, &mut looks).expect("can be shared");
+        let outcome = run_to_equilibrium_shared(scene, plan, from, &team, &mut looks);
+        let outcome = outcome.expect("can be shared");
         let engine = &outcome.engine;
-        let (readings, stresses) = measured(scene, engine);
+        let (readings, stresses) = measured(scene, &outcome);
         let of = |points: &Vectors, i: usize| (points.x[i], points.y[i]);
         let places: Vec<_> =
             owned.iter().map(|&i| (of(engine.present(), i), of(engine.previous(), i))).collect();
@@ -138,9 +141,16 @@ fn parted(scene: &Scene, every: usize, ranks: usize, from: Option<&KeptParts>) -
     end
 }
 
-/// The readings on the whole body, and stresses of a rank's own particles; nothing without a material.
-fn measured(scene: &Scene, engine: &Engine) -> (String, Vec<[u64; 3]>) {
-    let Some(elastic) = &scene.material else { return Default::default() };
+/// The readings on the whole body, and stresses of a rank's own particles: nothing without a material, but how it was solved.
+fn measured(scene: &Scene, outcome: &Outcome) -> (String, Vec<[u64; 3]>) {
+    let engine = &outcome.engine;
+    let how = |solved: &Solved| {
+        let Solved { solver, why, iterations, residuals, converged, known_to, .. } = solved;
+        let residuals: Vec<u64> = residuals.iter().map(|residual| residual.to_bits()).collect();
+        format!("{solver} {why} {iterations} {converged} {known_to:?} {residuals:?}")
+    };
+    let how = outcome.solved.as_ref().map_or_else(String::new, how);
+    let Some(elastic) = &scene.material else { return (how, Vec::new()) };
     let stresses = Stresses::at_present(engine, elastic).expect("there are cells");
     let own = engine.body().owned_in_order().into_iter().map(|i| stresses.particles[i]);
     let of =
@@ -148,7 +158,7 @@ fn measured(scene: &Scene, engine: &Engine) -> (String, Vec<[u64; 3]>) {
     let readings = Mechanics::under(&stresses, engine, elastic).expect("there are cells");
     let places = at_places(scene, engine, &stresses);
     let cautions = readings.cautions(engine);
-    (format!("{readings:#?} {places:#?} {cautions:?}"), own.map(of).collect())
+    (format!("{readings:#?} {places:#?} {cautions:?} {how}"), own.map(of).collect())
 }
 
 /// The histories of a run alone that is looked at in each step, and what is measured at its end.
@@ -159,15 +169,15 @@ fn probed(scene: &Scene) -> (Vec<ProbeSeries>, (String, Vec<[u64; 3]>)) {
         probes.iter_mut().for_each(|probe| probe.record(engine));
         ControlFlow::Continue(())
     };
-    let outcome = run_watched(plan, &mut EachStep(&mut see));
-    (probes, measured(scene, &outcome.engine))
+    let outcome = run_to_equilibrium_watched(scene, plan, &mut EachStep(&mut see));
+    (probes, measured(scene, &outcome.expect("an end")))
 }
 
 fn assert_parted_the_same(name: &str, sets: &[&str], every: usize) {
     assert_scene_parted_the_same(&load(name, sets), &format!("{name} {sets:?}"), every);
 }
 
-fn assert_scene_parted_the_same(scene: &Scene, name: &str, every: usize) {
+pub fn assert_scene_parted_the_same(scene: &Scene, name: &str, every: usize) {
     let (probes, (readings, stresses)) = probed(scene);
     let mut expected = End { seen: Vec::new(), probes, readings, ..alone(scene, every) };
     expected.places.extend(stresses.into_iter().flatten());
@@ -280,7 +290,7 @@ fn what_is_found_on_the_way_of_a_body_in_parts_is_what_a_run_alone_finds() {
     }
 }
 
-const PLATE: &str = r#"
+pub const PLATE: &str = r#"
 title = "A plate in parts"
 lattice = { kind = "square", spacing = 1.0 }
 rule = { mean = { kind = "material" } }
@@ -305,7 +315,7 @@ motion = { kind = "keyframes", frames = [{ step = 40, displacement = [1.5, 0.4] 
 probes = [1, 30, 61, 100]
 "#;
 
-fn plate(text: &str, sets: &[&str]) -> Scene {
+pub fn plate(text: &str, sets: &[&str]) -> Scene {
     let all: Vec<String> = sets.iter().map(|&set| set.to_owned()).collect();
     Scene::parse("plate", "plate", text, &all, None).unwrap_or_else(|error| panic!("{sets:?}: {error}"))
 }
@@ -462,7 +472,7 @@ fn loads_on_a_body_in_parts_are_those_on_one_laid_out_as_a_whole() {
 }
 
 /// What a scene is refused for as a whole and in parts, on every rank: something that says `what`.
-fn assert_refused_the_same(scene: &Scene, what: &str) {
+pub fn assert_refused_the_same(scene: &Scene, what: &str) {
     assert_eq!(laid_out_whole_for(scene), None);
     let expected = Plan::new(scene).expect_err(what).to_string();
     assert!(expected.contains(what), "{what}: {expected}");

@@ -280,6 +280,8 @@ pub struct SolverShares {
     pub particles: Vec<usize>,
     /// The most that a rank receives of others before it applies the operator, in particles.
     pub received: usize,
+    /// Whether each sets up the whole: particles at no site are not set up in parts.
+    pub is_set_up_whole: bool,
 }
 
 /// How so many ranks would share a solve; `None` where each would solve the whole system.
@@ -291,7 +293,8 @@ pub fn shared_by(system: &System, solver: Solver, ranks: usize) -> Option<Solver
     let cuts = Cuts::new(&matrix.bounds, ranks);
     let received = |rank: usize| received_by(&matrix, &cuts, rank);
     let particles = (0..ranks).map(|rank| cuts.particles_of(rank).len()).collect();
-    Some(SolverShares { particles, received: (0..ranks).map(received).max().unwrap_or_default() })
+    let received = (0..ranks).map(received).max().unwrap_or_default();
+    Some(SolverShares { particles, received, is_set_up_whole: !matrix.outliers.places.is_empty() })
 }
 
 /// The result of a solver, which is the same on all ranks.

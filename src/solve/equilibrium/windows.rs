@@ -147,3 +147,6 @@ pub(super) fn whole_of_part(part: &SystemPart, matrix: Matrix) -> Matrix {
         fetched(team, &matrix, (&shares, step), &vec![all; team.count()]);
     Matrix::compile(columns, class, rows)
 }
+
+#[cfg(test)]
+mod tests;
