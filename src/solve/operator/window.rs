@@ -67,9 +67,9 @@ impl Census {
         let counts: Vec<usize> = shares.iter().map(|share| WORDS * share.len()).collect();
         let all = team.gather(&own, &counts);
         let all: Vec<&[u64]> = all.chunks_exact(WORDS).collect();
-        let has_some = |column: &&[u64]| column[0] > 0;
+        let has_some = |column: &[u64]| column[0] > 0;
         let left_out = all.iter().take_while(|column| !has_some(column)).count();
-        let end = all.iter().rposition(|column| has_some(&column)).map_or(left_out, |last| last + 1);
+        let end = all.iter().rposition(|column| has_some(column)).map_or(left_out, |last| last + 1);
         let (mut before, mut sum) = (vec![(0, 0)], (0, 0));
         let (mut rows, mut occupied): (Option<[i32; 2]>, _) = (None, 0);
         for of in &all[left_out..end] {

@@ -226,7 +226,7 @@ impl<'a> Cycle<'a> {
     }
 
     fn coarsest_matrix(&self) -> &Matrix {
-        self.levels.last().map_or(self.matrix, |level| &level.matrix)
+        self.levels.last().map_or(self.matrix, |level| &*level.matrix)
     }
 
     /// `v` of the finest level becomes the cycle's answer to its `f`.
@@ -258,7 +258,7 @@ fn descend(
     if let Some(Transfers { team, down, .. }) = &next.transfers {
         down.receive(team, u);
     }
-    let levels = (matrix, &next.matrix);
+    let levels = (matrix, &*next.matrix);
     next.transfer.restrict(levels, &next.outliers, u, &mut next.vectors.f);
     descend(&next.matrix, &mut next.vectors, (smoothers, further), coarsest);
     if let Some(Transfers { team, up, .. }) = &next.transfers {
@@ -299,8 +299,8 @@ impl Level {
     fn in_window(fine: &Matrix, coarse: &Arc<Matrix>, transfer: Transfer) -> Self {
         let outliers = OutlierShares { first: usize::MAX, ..OutlierShares::default() };
         let parts = fine.part.as_deref().zip(coarse.part.as_deref());
-        let transfers =
-            parts.map(|(above, here)| Transfers::new([(above, fine), (here, coarse)], transfer, &outliers));
+        let transfers = parts
+            .map(|(above, here)| Transfers::new([(above, fine), (here, &**coarse)], transfer, &outliers));
         let vectors = LevelVectors::new(coarse.count());
         Self { transfer, outliers, matrix: coarse.clone(), vectors, transfers }
     }
