@@ -28,6 +28,9 @@ struct Level {
     own: Vec<Range<i32>>,
 }
 
+/// The way between two levels, and the other one.
+type Way<'a> = (&'a Transfer, &'a Level);
+
 impl Level {
     fn new(team: &Team, matrix: Matrix, shares: Vec<Range<i32>>, step: i32) -> Self {
         let census = Arc::new(Census::among(team, &matrix, &shares, step));
@@ -63,13 +66,37 @@ impl Level {
         fetched(team, &self.matrix, (&self.shares, self.census.step), &wants)
     }
 
+    /// The columns that a rank iterates with, if there are any.
+    fn own_of(&self, rank: usize) -> Option<&Range<i32>> {
+        Some(&self.own[rank]).filter(|own| !own.is_empty())
+    }
+
+    /// The columns that the rows of a rank lead to.
+    fn read_by(&self, rank: usize) -> Option<Range<i32>> {
+        self.own_of(rank).map(|own| own.start - self.reach..own.end + self.reach)
+    }
+
+    /// What this rank needs of it, with the ways from the level above and to the one below.
+    fn window(&self, team: &Team, (above, below): (Option<Way<'_>>, Option<Way<'_>>)) -> Matrix {
+        let wants = |rank: usize| {
+            let down = below.and_then(|(way, level)| Some(way.columns_below(level.own_of(rank)?)));
+            let up = above.and_then(|(way, level)| Some(way.columns_above(level.own_of(rank)?)));
+            let all = [self.read_by(rank), down, up].into_iter().flatten();
+            all.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end)).unwrap_or(0..0)
+        };
+        let fetched = self.fetched(team, &(0..team.count()).map(wants).collect::<Vec<_>>());
+        let read = |rank: usize| self.read_by(rank).map_or(0..0, |columns| self.census.particles(columns));
+        fetched.in_window(&self.census, |first| Part::in_window(team, self.cuts.clone(), first, read))
+    }
+
     /// The next coarser one.
     fn coarser(&self, team: &Team, transfer: Transfer) -> Self {
-        let [across, all] = [transfer.steps[0], self.census.range().end];
+        let (across, all) = (transfer.steps[0], self.census.range());
+        let (first, end) = (all.start.div_euclid(across), (all.end - 1).div_euclid(across) + 2);
         let begin = |rank: usize| match rank {
-            0 => self.census.range().start.div_euclid(across),
-            _ if rank == team.count() => (all - 1).div_euclid(across) + 2,
-            _ => (self.shares[rank].start + across - 1).div_euclid(across),
+            0 => first,
+            _ if rank == team.count() => end,
+            _ => (self.shares[rank].start + across - 1).div_euclid(across).clamp(first, end),
         };
         let shares: Vec<_> = (0..team.count()).map(|rank| begin(rank)..begin(rank + 1)).collect();
         let below = |share: &Range<i32>| if share.is_empty() { 0..0 } else { transfer.columns_below(share) };
@@ -88,54 +115,35 @@ pub(super) fn of_part(
 ) -> (Matrix, Vec<(Transfer, Arc<Matrix>)>) {
     let team = &part.team;
     let (shares, step) = part.columns(&matrix.columns);
-    let mut level = Level::new(team, matrix, shares, step);
-    let (mut spacing, mut above): (_, Option<(Transfer, Vec<Range<i32>>)>) = (spacing_of(grid), None);
-    let (mut finest, mut coarser) = (None, Vec::new());
-    loop {
-        let is_finest = finest.is_none();
+    let mut spacing = spacing_of(grid);
+    let mut levels = vec![Level::new(team, matrix, shares, step)];
+    let mut ways: Vec<Transfer> = Vec::new();
+    while coarsened {
+        let level = &levels[ways.len()];
         let census = &level.census;
-        let goes_on = coarsened
-            && level.cuts.is_shared()
-            && !is_coarse_enough((census.count(), census.extent()), is_finest);
-        let steps = match is_finest {
+        let steps = match ways.is_empty() {
             true => first_steps(grid, census.particles_per_site()),
             false => next_steps(spacing),
         };
-        let transfer = Transfer { steps };
-        let next = goes_on.then(|| level.coarser(team, transfer));
-        let next = next.filter(|next| next.census.count() < level.census.count());
-        if coarsened && next.is_none() {
-            level.leave_to_one(team);
-        }
-        let wants = |rank: usize| {
-            let own = &level.own[rank];
-            let read = (!own.is_empty()).then(|| own.start - level.reach..own.end + level.reach);
-            let down = next.iter().map(|next| &next.own[rank]).filter(|own| !own.is_empty());
-            let up =
-                above.iter().map(|(transfer, own)| (transfer, &own[rank])).filter(|(_, own)| !own.is_empty());
-            let wanted = read.into_iter();
-            let wanted = wanted.chain(down.map(|own| transfer.columns_below(own)));
-            let wanted = wanted.chain(up.map(|(transfer, own)| transfer.columns_above(own)));
-            wanted.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end)).unwrap_or(0..0)
-        };
-        let wants: Vec<_> = (0..team.count()).map(wants).collect();
-        let window = level.fetched(team, &wants);
-        let read = |rank: usize| match &level.own[rank] {
-            own if own.is_empty() => 0..0,
-            own => level.census.particles(own.start - level.reach..own.end + level.reach),
-        };
-        let of_rank = |first| Part::in_window(team, level.cuts.clone(), first, read);
-        let window = window.in_window(&level.census, of_rank);
-        match above.take() {
-            None => finest = Some(window.with_largest(team)),
-            Some((way, _)) => coarser.push((way, Arc::new(window))),
-        }
-        above = Some((transfer, level.own));
-        let Some(next) = next else { break };
+        let is_over = is_coarse_enough((census.count(), census.extent()), ways.is_empty());
+        let goes_on = level.cuts.is_shared() && !is_over;
+        let next = goes_on.then(|| level.coarser(team, Transfer { steps }));
+        let Some(next) = next.filter(|next| next.census.count() < census.count()) else { break };
         spacing = [0, 1].map(|k| spacing[k] * f64::from(steps[k]));
-        level = next;
+        ways.push(Transfer { steps });
+        levels.push(next);
     }
-    (finest.expect("the body's own"), coarser)
+    if coarsened {
+        levels[ways.len()].leave_to_one(team);
+    }
+    let window = |at: usize| {
+        let level = &levels[at];
+        let below = ways.get(at).map(|way| (way, &levels[at + 1]));
+        let above = at.checked_sub(1).map(|above| (&ways[above], &levels[above]));
+        level.window(team, (above, below))
+    };
+    let finest = window(0).with_largest(team);
+    (finest, (0..).zip(&ways).map(|(above, way)| (*way, Arc::new(window(above + 1)))).collect())
 }
 
 /// The matrix of the body, on every rank.
