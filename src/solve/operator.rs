@@ -98,6 +98,21 @@ pub enum OperatorError {
     },
 }
 
+impl OperatorError {
+    /// The same of a part that begins with the `first` particle of the whole, counted from 0.
+    pub(crate) fn in_whole(mut self, first: usize) -> Self {
+        let (Self::Order { particle }
+        | Self::NoClass { particle, .. }
+        | Self::NoNeighbour { particle, .. }
+        | Self::NotFinite { particle }) = &mut self
+        else {
+            return self;
+        };
+        *particle += first;
+        self
+    }
+}
+
 /// Rows for all particles of a body that follow.
 #[derive(Clone, Debug)]
 pub struct Operator {
