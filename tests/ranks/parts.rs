@@ -181,7 +181,8 @@ pub fn assert_scene_parted_the_same(scene: &Scene, name: &str, every: usize) {
     let (probes, (readings, stresses)) = probed(scene);
     let mut expected = End { seen: Vec::new(), probes, readings, ..alone(scene, every) };
     expected.places.extend(stresses.into_iter().flatten());
-    let kept = kept_parts(scene, every, 3);
+    // One that is put to rest at once is not begun and gone on with.
+    let kept = if scene.equilibrium.is_none() { kept_parts(scene, every, 3) } else { None };
     let begun = [1, 2, 3, 5, 8].map(|ranks| (ranks, None));
     for (ranks, from) in begun.into_iter().chain([(2, kept.as_ref()), (4, kept.as_ref())]) {
         let found = End { seen: Vec::new(), ..parted(scene, every, ranks, from) };
