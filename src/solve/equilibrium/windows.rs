@@ -118,7 +118,7 @@ pub(super) fn of_part(
     let mut spacing = spacing_of(grid);
     let mut levels = vec![Level::new(team, matrix, shares, step)];
     let mut ways: Vec<Transfer> = Vec::new();
-    while coarsened {
+    loop {
         let level = &levels[ways.len()];
         let census = &level.census;
         let steps = match ways.is_empty() {
@@ -126,7 +126,7 @@ pub(super) fn of_part(
             false => next_steps(spacing),
         };
         let is_over = is_coarse_enough((census.count(), census.extent()), ways.is_empty());
-        let goes_on = level.cuts.is_shared() && !is_over;
+        let goes_on = coarsened && level.cuts.is_shared() && !is_over;
         let next = goes_on.then(|| level.coarser(team, Transfer { steps }));
         let Some(next) = next.filter(|next| next.census.count() < census.count()) else { break };
         spacing = [0, 1].map(|k| spacing[k] * f64::from(steps[k]));
