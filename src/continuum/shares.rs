@@ -117,7 +117,8 @@ impl PartShares {
         let exchanged = match self.steps {
             _ if self.is_solved => {
                 format!(
-                    "; where there are groups of columns enough, it iterates on about as many and receives about {} bytes in each iteration",
+                    "; where there are groups of columns enough, it iterates on about as many and receives about \
+                     {} bytes in each iteration",
                     self.halo_bytes
                 )
             }
