@@ -131,11 +131,8 @@ fn a_run_on_ranks_writes_the_files_of_a_run_alone() {
 #[ignore = "needs mpirun"]
 fn equilibria_on_ranks_are_those_of_a_run_alone() {
     let folder = temporary();
-    let large = ["lattice.spacing=0.1", "body.shape.max=[40.0,22.0]", "equilibrium.solver=multigrid"];
-    let large = large.map(|set| ["--set", set]);
     let scenes: [(&str, &[&str]); 3] = [
-        // Five groups of columns, which two ranks share.
-        ("beam-loaded", large.as_flattened()),
+        ("beam-loaded", &LARGE_BEAM),
         ("plate-hole", &["--set", "equilibrium.solver=conjugate-gradients"]),
         ("elastica", &["--set", "lattice.spacing=0.25", "--set", "load_steps.increments=3"]),
     ];
@@ -285,6 +282,16 @@ fn ranks_with_different_programs_are_refused() {
     assert_eq!(names_in(folder.path()), ["other"]);
 }
 
+/// Five groups of columns, which two ranks share.
+const LARGE_BEAM: [&str; 6] = [
+    "--set",
+    "lattice.spacing=0.1",
+    "--set",
+    "body.shape.max=[40.0,22.0]",
+    "--set",
+    "equilibrium.solver=multigrid",
+];
+
 /// What keeps a run from being looked at as a whole: each rank lays out a part of the body.
 const PARTED: [&str; 3] = ["--no-report", "--figures", "none"];
 
@@ -322,6 +329,8 @@ fn a_run_in_parts_writes_the_tables_of_a_run_alone() {
         ("fracture", &["--steps", "80"]),
         ("tension", &["--set", when, "--steps", "60"]),
         ("fitted.toml", &[]),
+        ("beam-loaded", &[]),
+        ("beam-loaded", &LARGE_BEAM),
     ] {
         let run = |out: &'static str| [&["run", name, "--out", out][..], &PARTED, more].concat();
         assert_ends_well(&flockform(&run("alone"), folder.path()), name);

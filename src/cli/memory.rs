@@ -26,10 +26,10 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs) -> usize {
 }
 
 /// Bytes that one of so many ranks, with this part of a body, takes at its largest, its tables among them.
-pub fn of_part(plan: &Plan, ranks: usize) -> usize {
+pub fn of_part(scene: &Scene, plan: &Plan, ranks: usize) -> usize {
     let program =
         field(&read_to_string("/proc/self/status").unwrap_or_default(), "RssFile:").unwrap_or(16 << 10);
-    flockform::export::memory::of_part(plan, ranks, 1024 * program as usize)
+    flockform::export::memory::of_part(scene, plan, ranks, 1024 * program as usize)
 }
 
 /// Refuses a scene whose run takes more bytes than there are, so that no kernel has to end it on the way.

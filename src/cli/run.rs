@@ -116,19 +116,16 @@ impl Prepared {
         if let (Some(team), true) = (team, is_parted) {
             // What follows all ranks do together.
             begin.agree(fnv1a(&serde_json::to_vec(&scene.raw).expect("a scene was read from text")))?;
+            let scene = interruptible(scene);
             let plan = Plan::of_part(&scene, team)?;
             let digest = digest_of_parts(&plan, team);
-            memory::require(
-                &scene,
-                (ranks::others_here() + 1) as f64 * memory::of_part(&plan, team.count()) as f64,
-            )?;
+            let bytes = memory::of_part(&scene, &plan, team.count());
+            memory::require(&scene, (ranks::others_here() + 1) as f64 * bytes as f64)?;
             left.as_mut().map_or(Ok(()), |left| left.fit(&scene, &plan, digest))?;
             return Ok(Self { left, asked, scene, words: String::new(), plan, digest, is_parted });
         }
-        let Chosen { mut scene, words, .. } = choose(scene, &|more: &[String]| words_of.load_scene(more))?;
-        if let Some(equilibrium) = &mut scene.equilibrium {
-            equilibrium.request.interrupt = Interrupt::new(interrupt::flag());
-        }
+        let Chosen { scene, words, .. } = choose(scene, &|more: &[String]| words_of.load_scene(more))?;
+        let scene = interruptible(scene);
         let plan = plan(&scene)?;
         // The ranks of a machine share its memory, and each holds the whole body.
         let of_others = ranks::others_here() * bytes_each(&scene, &plan);
@@ -146,6 +143,14 @@ impl Prepared {
         let all: Vec<u8> = self.digest.to_le_bytes().into_iter().chain(scene).chain(state).collect();
         fnv1a(&all)
     }
+}
+
+/// The scene with an equilibrium whose solve an interrupt ends.
+fn interruptible(mut scene: Scene) -> Scene {
+    if let Some(equilibrium) = &mut scene.equilibrium {
+        equilibrium.request.interrupt = Interrupt::new(interrupt::flag());
+    }
+    scene
 }
 
 /// The part of a rank that neither prints nor writes, and has the whole body.

@@ -5,6 +5,7 @@ mod increments;
 use std::ops::ControlFlow;
 
 use super::layout::{held, held_components};
+use super::parts::agreed;
 use super::plan::Plan;
 use super::run::{Outcome, SharedError, StopReason, overflow, run_shared, run_watched};
 use crate::engine::Engine;
@@ -19,6 +20,7 @@ use crate::scene::{LoadSteps, Scene, SceneError};
 use crate::solve::corotated::{self, CorotatedError, Way};
 use crate::solve::equilibrium::{Choice, Request, SolveError, Solved, Solver, System, choose, solve_shared};
 use crate::solve::linear::{HeldComponent, NotLinear, system};
+use crate::solve::shared::SystemPart;
 
 /// Runs a plan to its end as its scene asks: stepping, or straight to the equilibrium under the whole load. `see` sees each step of
 /// a stepped run as [`run`](super::run::run) shows it, and of a solved one the end.
@@ -91,7 +93,7 @@ fn come_to_whole_load(
 ) -> Result<Outcome, SceneError> {
     let Some(asked) = &scene.equilibrium else { return Ok(run_watched(plan, observer)) };
     let solved = solve_plan(scene, &asked.request, &plan, team)?;
-    let outcome = outcome(plan, solved);
+    let outcome = outcome(plan, solved, team);
     // There is nothing left to break off.
     let _ = observer.see(&outcome.engine, outcome.residual);
     Ok(outcome)
@@ -103,7 +105,7 @@ fn come_to_whole_load(
 /// Names what in the scene has no equilibrium, or none that the solver asked for can find.
 pub fn solve_equilibrium(scene: &Scene, request: &Request, plan: Plan) -> Result<Outcome, SceneError> {
     let solved = solve_plan(scene, request, &plan, None)?;
-    Ok(outcome(plan, solved))
+    Ok(outcome(plan, solved, None))
 }
 
 fn solve_plan(
@@ -113,7 +115,14 @@ fn solve_plan(
     team: Option<&Team>,
 ) -> Result<Solved, SceneError> {
     if !corotated::is_corotated(&plan.setup.flock) {
-        let system = of_plan(scene, plan)?;
+        let system = match team.filter(|_| plan.setup.body.part.is_some()) {
+            None => of_plan(scene, plan)?,
+            Some(team) => {
+                let body = &plan.setup.body;
+                let part = SystemPart { team: team.clone(), first: body.first(), owned: body.owned() };
+                agreed(scene, team, of_plan(scene, plan))?.of_part(part)
+            }
+        };
         return solve_shared(&system, request, team).map_err(|error| refuse(scene, &error));
     }
     let steps = steps_of_the_way(plan) as f64;
@@ -206,6 +215,10 @@ fn of_plan_after(scene: &Scene, plan: &Plan, steps: f64) -> Result<System, Scene
             NotLinear::Broken => ("roles", "leave [equilibrium] out to step with broken bonds"),
             NotLinear::Operator(_) => ("rule", "give weights that are finite"),
         };
+        let error = match error {
+            NotLinear::Operator(error) => NotLinear::Operator(error.in_whole(plan.setup.body.first())),
+            error => error,
+        };
         scene.refuse(key, format!("no equilibrium can be solved for: {error}"), help)
     })?;
     system.is_nearly_incompressible = is_nearly_incompressible(scene);
@@ -252,9 +265,12 @@ fn refuse(scene: &Scene, error: &SolveError) -> SceneError {
     scene.refuse("equilibrium", error.to_string(), help)
 }
 
-fn outcome(plan: Plan, solved: Solved) -> Outcome {
+fn outcome(plan: Plan, solved: Solved, team: Option<&Team>) -> Outcome {
     let (step, spacing) = (plan.stop.steps, plan.setup.body.lattice.spacing());
     let mut engine = Engine::new(plan.setup);
+    if let Some(team) = team.filter(|_| engine.body().part.is_some()) {
+        engine.join(team.clone()).expect("a body that is swept in sequence is laid out whole");
+    }
     engine.place_at_rest(step, &solved.displacement);
     let residual = farthest_from_target(&engine) / spacing;
     let reason = overflow(&engine).map_or_else(|| reason(&solved), StopReason::Diverged);
@@ -270,5 +286,6 @@ fn farthest_from_target(engine: &Engine) -> f64 {
     let present: &Vectors = engine.present();
     let follows = |&i: &usize| engine.roles()[i] == Role::Follower;
     let apart = |i: usize| distance(engine.flock().target(i, present), present.get(i));
-    (0..present.len()).filter(follows).map(apart).fold(0.0, f64::max)
+    let own = engine.body().owned().filter(follows).map(apart).fold(0.0, f64::max);
+    engine.largest_of_parts([own])[0]
 }

@@ -62,21 +62,22 @@ pub fn stepped(plan: &Plan) -> usize {
 }
 
 /// Bytes that finding the equilibrium takes beside the plan, less the positions that the engine has later; 0 for a scene
-/// that is stepped.
+/// that is stepped. Of a part of a body a solver that ranks do not share takes what it takes of the whole.
 pub fn solving(scene: &Scene, plan: &Plan) -> usize {
     /// Vectors of conjugate gradients, and of all levels of multigrid.
     const BY_ITERATION: f64 = 118.0;
     /// The matrix of a body that turns, which differs from row to row, and its factor.
     const COROTATED: f64 = 4_600.0;
     let Some(asked) = &scene.equilibrium else { return 0 };
-    let count = plan.count() as f64;
+    let is_shared = !matches!(asked.request.solver, Choice::This(solver) if !solver.is_shared());
+    let count = if is_shared { plan.count() } else { plan.setup.body.total() } as f64;
     let is_direct = match asked.request.solver {
         Choice::This(solver) => solver == Solver::Direct,
         Choice::Auto => plan.count() <= UNSYMMETRIC_UP_TO && is_one_sided(plan),
     };
     match (is_corotated(&plan.setup.flock), is_direct) {
         (true, _) => (COROTATED * count) as usize,
-        (false, true) => factor(plan),
+        (false, true) => factor(count),
         (false, false) => (BY_ITERATION * count) as usize,
     }
 }
@@ -91,14 +92,13 @@ pub fn fallback(scene: &Scene, plan: &Plan) -> Option<usize> {
         && (DIRECT_UP_TO + 1..=FACTORISED_UP_TO).contains(&followers)
         && !is_corotated(&plan.setup.flock)
         && !is_one_sided(plan);
-    falls_back.then(|| factor(plan))
+    falls_back.then(|| factor(plan.count() as f64))
 }
 
 /// Bytes of a factor.
-fn factor(plan: &Plan) -> usize {
+fn factor(count: f64) -> usize {
     /// Of each particle, by each doubling of the body from 2^11 particles on.
     const EACH: f64 = 530.0;
-    let count = plan.count() as f64;
     (EACH * (count.log2() - 11.0).max(1.0) * count) as usize
 }
 

@@ -184,7 +184,9 @@ impl Plan {
             },
             ..Setup::new(body, flock, roles, update)
         };
-        if setup.body.part.is_some() && !probes.is_empty() {
+        // One that is put to rest has no history.
+        let is_parted = setup.body.part.is_some();
+        if is_parted && scene.equilibrium.is_none() && !probes.is_empty() {
             setup.probes = Some(probes.iter().map(|&index| ProbeSeries::new(index)).collect());
         }
         take_first_roles(&mut setup);

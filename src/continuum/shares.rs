@@ -12,7 +12,7 @@ use crate::scene::{Scene, SceneError};
 use crate::solve::corotated::is_corotated;
 use crate::solve::equilibrium::{Request, SolverShares, choose, shared_by};
 use crate::sweep::Sweep;
-use crate::sweep::domain::Share;
+use crate::sweep::domain::{Domain, Share};
 
 /// Bytes of a position.
 const PLACE: usize = 16;
@@ -56,6 +56,8 @@ pub struct Shares {
     pub exchanged: Exchanged,
     /// Bytes that each rank takes for the body and what steps or solves it; the first one takes more for the results.
     pub bytes: usize,
+    /// Whether each rank sets up the whole system of which it shares the iterations.
+    pub is_set_up_whole: bool,
 }
 
 /// The parts of a body of which each rank lays out one.
@@ -65,7 +67,9 @@ pub struct PartShares {
     pub particles: Vec<usize>,
     /// Most steps that the rank which has most takes together; 0 where it looks at each.
     pub steps: usize,
-    /// Bytes that it receives before as many, or in each step.
+    /// Whether it is solved and not stepped.
+    pub is_solved: bool,
+    /// Bytes that it receives before as many, or in each step, or each iteration of a solver.
     pub halo_bytes: usize,
     /// What it lays out.
     pub largest: Plan,
@@ -84,18 +88,26 @@ impl PartShares {
         let parting = Parting::alone(scene, ranks)?;
         let rank = parting.largest();
         let largest = Plan::of_part_alone(scene, &parting, rank)?;
-        let Setup { body, flock, update, roles, probes, changes, .. } = &largest.setup;
+        let (steps, halo) = match scene.equilibrium {
+            Some(_) => (0, around(&largest.setup)),
+            None => Self::swept_together(&largest.setup, rank, ranks),
+        };
+        let is_solved = scene.equilibrium.is_some();
+        let (particles, halo_bytes) = (parting.counts(), PLACE * halo);
+        Ok(Some(Self { particles, steps, is_solved, halo_bytes, largest }))
+    }
+
+    /// Most steps that a rank takes together, and particles that it receives before these.
+    fn swept_together(setup: &Setup, rank: usize, ranks: usize) -> (usize, usize) {
+        let Setup { body, flock, update, roles, probes, changes, .. } = setup;
         let part = body.part.as_ref().map(Part::held);
         let share = Share { rank, ranks, part, ..Share::whole() };
         let mut sweep = Sweep::compile_share(*update, flock, roles, share);
         // Bonds that are broken may be those of other parts.
         let looks = flock.bonds.is_some() || looks_at_every_step(false, flock, changes);
         let takes_several = !looks && sweep.takes_several(body.frame.as_ref());
-        let (steps, halo) = sweep
-            .domain_mut()
-            .map_or((0, 0), |domain| domain.needs(takes_several).most(usize::from(probes.is_some())));
-        let (particles, halo_bytes) = (parting.counts(), PLACE * halo);
-        Ok(Some(Self { particles, steps, halo_bytes, largest }))
+        let needs = |domain: &mut Domain| domain.needs(takes_several).most(usize::from(probes.is_some()));
+        sweep.domain_mut().map_or((0, 0), needs)
     }
 
     /// For the plan: names and values, with the bytes that the rank takes which takes most.
@@ -103,6 +115,13 @@ impl PartShares {
         let (least, most) = (self.particles.iter().min(), self.particles.iter().max());
         let (least, most) = (least.copied().unwrap_or_default(), most.copied().unwrap_or_default());
         let exchanged = match self.steps {
+            _ if self.is_solved => {
+                format!(
+                    "; where there are groups of columns enough, it iterates on about as many and receives about \
+                     {} bytes in each iteration",
+                    self.halo_bytes
+                )
+            }
             0 => format!("; of others it receives {} bytes in each step", self.halo_bytes),
             steps => format!("; of others it receives {} bytes before every {steps} steps", self.halo_bytes),
         };
@@ -113,6 +132,15 @@ impl PartShares {
         let facts = [("parts", parts), ("memory of a part", memory)];
         facts.map(|(name, value)| (name.to_owned(), value)).into()
     }
+}
+
+/// Particles of others in the columns that those of a part see.
+fn around(Setup { body, flock, .. }: &Setup) -> usize {
+    let (owned, column) = (body.owned(), |i: usize| body.sites[i][0]);
+    let seen = |i: usize| flock.neighbours.of(i).iter().map(move |&k| column(k as usize));
+    let columns = owned.clone().flat_map(seen);
+    let ends = columns.fold([i32::MAX, i32::MIN], |[low, high], column| [low.min(column), high.max(column)]);
+    (0..body.count()).filter(|&i| !owned.contains(&i) && (ends[0]..=ends[1]).contains(&column(i))).count()
 }
 
 impl Shares {
@@ -138,21 +166,24 @@ impl Shares {
             let largest = sweep.halo_sizes(steps).into_iter().max().unwrap_or_default();
             Exchanged::Halos { steps, bytes: PLACE * largest }
         };
-        Ok(Self { particles, exchanged, bytes: bytes_each(scene, plan) })
+        Ok(Self { particles, exchanged, bytes: bytes_each(scene, plan), is_set_up_whole: false })
     }
 
     fn of_solver(scene: &Scene, request: &Request, plan: &Plan, ranks: usize) -> Result<Self, SceneError> {
         let bytes = bytes_each(scene, plan);
-        let all = Self { particles: vec![plan.count(); ranks], exchanged: Exchanged::Interrupts, bytes };
+        let (particles, exchanged) = (vec![plan.count(); ranks], Exchanged::Interrupts);
+        let all = Self { particles, exchanged, bytes, is_set_up_whole: true };
         if is_corotated(&plan.setup.flock) {
             return Ok(all);
         }
         let system = of_plan(scene, plan)?;
         let (solver, _) = choose(&system, request);
-        Ok(shared_by(&system, solver, ranks).map_or(all, |SolverShares { particles, received }| Self {
+        let shares = shared_by(&system, solver, ranks);
+        Ok(shares.map_or(all, |SolverShares { particles, received, is_set_up_whole }| Self {
             particles,
             exchanged: Exchanged::Iterations { bytes: PLACE * received },
             bytes,
+            is_set_up_whole,
         }))
     }
 
@@ -165,7 +196,8 @@ impl Shares {
         let idle = if idle == 0 { String::new() } else { format!("; {idle} have nothing to do") };
         let moved = match self.exchanged {
             Exchanged::Iterations { .. } => {
-                format!("{ranks}, which iterate on {least} to {most} particles each{idle}; each sets all up")
+                let set_up = if self.is_set_up_whole { "; each sets all up" } else { "" };
+                format!("{ranks}, which iterate on {least} to {most} particles each{idle}{set_up}")
             }
             Exchanged::Interrupts => {
                 format!("{ranks}, each of which solves for all {most}: no faster than one")

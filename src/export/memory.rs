@@ -69,7 +69,7 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
 
 /// Bytes that one of so many ranks with a part of a body takes at its largest, by a program whose own code takes so many: there
 /// are no figures and no report, and tables are written row by row.
-pub fn of_part(plan: &Plan, ranks: usize, program: usize) -> usize {
+pub fn of_part(scene: &Scene, plan: &Plan, ranks: usize, program: usize) -> usize {
     /// Memory of MPI, and what it shares with each rank on a machine; measured with Open MPI 4.1.
     const MPI: [usize; 2] = [4 << 20, 3 << 19];
     /// Ranks that share a machine's memory, as far as it is known beforehand.
@@ -78,7 +78,7 @@ pub fn of_part(plan: &Plan, ranks: usize, program: usize) -> usize {
     const ON_THE_WAY: usize = 2 * 2 * 16;
     let [each, of_rank] = MPI;
     let halo = plan.setup.body.part.as_ref().map_or(0, |part| part.exact.len() - part.owned.len());
-    let most = measured(plan).max(ON_THE_WAY * halo);
+    let most = measured(plan).max(ON_THE_WAY * halo).max(solving(scene, plan));
     program + RUNNING + stepped(plan) + each + of_rank * ranks.min(ON_A_MACHINE) + most
 }
 

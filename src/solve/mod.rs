@@ -9,5 +9,6 @@ pub mod interrupt;
 pub mod linear;
 pub mod operator;
 pub(crate) mod part;
+pub(crate) mod shared;
 pub mod spectrum;
 pub(crate) mod stopwatch;

@@ -14,14 +14,19 @@ mod rows;
 pub mod samples;
 #[cfg(test)]
 mod tests;
+mod window;
 
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 pub(crate) use columns::{Columns, Segment};
 pub(crate) use kernel::{Particles, RowCoefficients, Task, pass, product};
+#[cfg(test)]
+pub(crate) use matrix::SIZE;
 pub(crate) use matrix::{HELD, Matrix, leads_to_outlier};
 pub(crate) use rows::{RowRef, Rows};
+pub(crate) use window::{Census, Name, fetched, name_of};
 
 use crate::flock::block::{Block, transposed};
 use crate::flock::lattice::Site;
@@ -93,6 +98,21 @@ pub enum OperatorError {
     },
 }
 
+impl OperatorError {
+    /// The same of a part that begins with the `first` particle of the whole, counted from 0.
+    pub(crate) fn in_whole(mut self, first: usize) -> Self {
+        let (Self::Order { particle }
+        | Self::NoClass { particle, .. }
+        | Self::NoNeighbour { particle, .. }
+        | Self::NotFinite { particle }) = &mut self
+        else {
+            return self;
+        };
+        *particle += first;
+        self
+    }
+}
+
 /// Rows for all particles of a body that follow.
 #[derive(Clone, Debug)]
 pub struct Operator {
@@ -100,6 +120,8 @@ pub struct Operator {
     pub(super) class: Vec<u32>,
     /// Divided by the stiffness.
     rows: Arc<Rows>,
+    /// Of each row.
+    names: Vec<Name>,
     /// The power of two near the largest stiffness that holds a particle back \[force / length\]: no square of one over- or
     /// underflows, and no bit changes.
     pub(super) stiffness: f64,
@@ -128,7 +150,7 @@ impl Operator {
     pub fn new(
         sites: &[Site],
         grid: [[f64; 2]; 2],
-        class: Vec<u32>,
+        mut class: Vec<u32>,
         rows: Vec<Row>,
         follows: Vec<bool>,
     ) -> Result<Self, OperatorError> {
@@ -147,10 +169,12 @@ impl Operator {
         let outliers = Outliers { first: count, places: Vec::new() };
         let diagonals = rows.iter().flat_map(|row| row.diagonal.as_flattened().iter().copied());
         let stiffness = power_of_two(diagonals);
+        let names: Vec<Name> = rows.iter().map(|row| name_of(content(row))).collect();
+        join_alike(&names, &mut class);
         let rows =
             Arc::new(Rows::from(rows.into_iter().map(|row| row.divided_by(stiffness)).collect::<Vec<_>>()));
         let held_axes = Vec::new();
-        let operator = Self { columns, class, rows, stiffness, follows, grid, outliers, held_axes };
+        let operator = Self { columns, class, rows, names, stiffness, follows, grid, outliers, held_axes };
         operator.check_rows()?;
         Ok(operator)
     }
@@ -167,10 +191,11 @@ impl Operator {
         let mut class = vec![0; sites.len()];
         for i in (0..sites.len().min(follows.len())).filter(|&i| follows[i]) {
             let row = row(i);
+            let is_alike = |class: u32| content(&rows[class as usize]).eq(content(&row));
             // Most particles are like the one before.
             class[i] = match i.checked_sub(1).filter(|&before| follows[before]) {
-                Some(before) if rows[class[before] as usize] == row => class[before],
-                _ => *known.entry(content(&row)).or_insert_with(|| {
+                Some(before) if is_alike(class[before]) => class[before],
+                _ => *known.entry(content(&row).collect()).or_insert_with(|| {
                     rows.push(row);
                     rows.len() as u32 - 1
                 }),
@@ -194,6 +219,29 @@ impl Operator {
             } else {
                 Vec::new()
             };
+        self
+    }
+
+    /// The largest stiffness of these particles, as far as they follow \[force / length\].
+    pub(super) fn largest_stiffness(&self, of: Range<usize>) -> f64 {
+        let mut is_used = vec![false; self.rows.len()];
+        of.filter(|&i| self.follows[i]).for_each(|i| is_used[self.class[i] as usize] = true);
+        let used = self.rows.iter().zip(is_used).filter(|(_, is_used)| *is_used);
+        let values = used.flat_map(|(row, _)| row.diagonal.as_flattened());
+        values.fold(0.0, |largest: f64, value| largest.max((value * self.stiffness).abs()))
+    }
+
+    /// The same with its rows divided by the power of two near this stiffness, the largest of a body that this is a part of.
+    pub(super) fn scaled_to(mut self, largest: f64) -> Self {
+        let stiffness = power_of_two([largest].into_iter());
+        if stiffness != self.stiffness {
+            let row = |row: RowRef<'_>| {
+                Row { diagonal: *row.diagonal, entries: row.entries.to_vec() }
+                    .divided_by(stiffness / self.stiffness)
+            };
+            self.rows = Arc::new(Rows::from(self.rows.iter().map(row).collect::<Vec<_>>()));
+            self.stiffness = stiffness;
+        }
         self
     }
 
@@ -228,12 +276,15 @@ impl Operator {
         self.rows.of(self.class[particle])
     }
 
-    /// Two followers, counted from 0, of which the second does not feel the first as the first feels it;
+    /// Two followers, counted from 0, of which the second does not feel the first, one of these particles, as the first feels it;
     /// `None` where the operator is symmetric, to rounding.
-    pub fn asymmetric_pair(&self) -> Option<[usize; 2]> {
+    pub fn asymmetric_pair(&self, of: Range<usize>) -> Option<[usize; 2]> {
         // The last class that each entry of each class was found to fit; a body has few pairs.
         let mut fits: Vec<Vec<u32>> = self.rows.iter().map(|row| vec![HELD; row.entries.len()]).collect();
         self.stretches(|stretch, firsts| {
+            if !of.contains(&stretch.start) {
+                return None;
+            }
             let class = stretch.class as usize;
             for (e, first) in firsts.iter().enumerate() {
                 let first = (*first)?;
@@ -343,13 +394,22 @@ pub(super) fn add(a: Site, b: Site) -> Site {
     [a[0] + b[0], a[1] + b[1]]
 }
 
-/// The bits that two rows must share to be of one class.
-fn content(row: &Row) -> Vec<u64> {
-    let blocks = |block: &Block| block.iter().flatten().map(|value| value.to_bits()).collect::<Vec<_>>();
-    let mut content = blocks(&row.diagonal);
-    for (offset, block) in &row.entries {
-        content.push((offset[0] as u64) << 32 | u64::from(offset[1] as u32));
-        content.extend(blocks(block));
+/// Gives particles whose rows are the same one class: whether two have one must not hang on how they were found.
+fn join_alike(names: &[Name], class: &mut [u32]) {
+    let mut known: HashMap<Name, u32> = HashMap::new();
+    let of_name: Vec<u32> =
+        (0..).zip(names).map(|(class, name)| *known.entry(*name).or_insert(class)).collect();
+    if known.len() < names.len() {
+        let joined = class.iter_mut().filter(|class| (**class as usize) < names.len());
+        joined.for_each(|class| *class = of_name[*class as usize]);
     }
-    content
+}
+
+/// The bits that two rows must share to be of one class.
+fn content(row: &Row) -> impl Iterator<Item = u64> + '_ {
+    let bits = |block: &Block| block.map(|row| row.map(f64::to_bits)).into_iter().flatten();
+    let entries = row.entries.iter().flat_map(move |(offset, block)| {
+        std::iter::once((offset[0] as u64) << 32 | u64::from(offset[1] as u32)).chain(bits(block))
+    });
+    bits(&row.diagonal).chain(entries)
 }

@@ -1,8 +1,9 @@
 //! The part of a matrix that one of several ranks computes, and what it receives from the others for it.
 //!
 //! A rank owns consecutive groups of columns. Every pass over the particles is made group by group, and every sum is
-//! added up over each group and then over the groups in their order, so ranks change no bit, as threads do not. All
-//! ranks have the whole matrix: each of them finds what all of them read, and nothing has to be negotiated.
+//! added up over each group and then over the groups in their order, so ranks change no bit, as threads do not. Each of them
+//! finds what all of them read, and nothing has to be negotiated: where all have the whole matrix, what the rows of each lead to,
+//! and where each has a window of it, the columns around its own.
 
 use std::ops::Range;
 
@@ -24,10 +25,10 @@ pub struct Cuts {
 }
 
 impl Cuts {
-    /// About as many particles for each rank; the first one owns all where there are few groups.
-    pub fn new(matrix: &Matrix, ranks: usize) -> Self {
-        let (bounds, groups) = (&matrix.bounds, matrix.groups());
-        let count = matrix.count();
+    /// About as many particles for each rank; the first one owns all where there are few groups. `bounds` are those of the groups
+    /// of the whole matrix.
+    pub fn new(bounds: &[usize], ranks: usize) -> Self {
+        let (groups, count) = (bounds.len() - 1, bounds[bounds.len() - 1]);
         let nearest = |particle: usize| {
             let after = bounds.partition_point(|&bound| bound < particle);
             let before = after.saturating_sub(1);
@@ -38,7 +39,16 @@ impl Cuts {
             _ if rank == ranks || groups < FEWEST_GROUPS * ranks => groups,
             _ => nearest(rank * count / ranks),
         };
-        let groups: Vec<usize> = (0..=ranks).map(first).collect();
+        Self::of_groups(bounds, (0..=ranks).map(first).collect())
+    }
+
+    /// All for the first rank.
+    pub fn of_one(bounds: &[usize], ranks: usize) -> Self {
+        let groups = (0..=ranks).map(|rank| if rank == 0 { 0 } else { bounds.len() - 1 });
+        Self::of_groups(bounds, groups.collect())
+    }
+
+    fn of_groups(bounds: &[usize], groups: Vec<usize>) -> Self {
         let particles = groups.iter().map(|&group| bounds[group]).collect();
         Self { groups, particles }
     }
@@ -59,7 +69,7 @@ impl Cuts {
     }
 
     /// Whether more than one rank owns something.
-    fn is_shared(&self) -> bool {
+    pub fn is_shared(&self) -> bool {
         self.groups.windows(2).filter(|ends| ends[0] < ends[1]).count() > 1
     }
 }
@@ -91,6 +101,13 @@ impl Halo {
         halo
     }
 
+    /// The same where the first particle here is this one of the whole.
+    pub fn here(mut self, first: usize) -> Self {
+        let of_ranks = self.sends.iter_mut().chain(&mut self.receives).flat_map(|(_, of)| of);
+        of_ranks.for_each(|range| *range = range.start - first..range.end - first);
+        self
+    }
+
     /// Exchanges the particles of a vector.
     pub fn receive<T: Real>(&self, team: &Team, v: &mut Vectors<T>) {
         if self.sends.is_empty() && self.receives.is_empty() {
@@ -119,8 +136,14 @@ pub struct Part {
 impl Part {
     /// The part of this rank.
     pub fn new(team: &Team, matrix: &Matrix) -> Self {
-        let cuts = Cuts::new(matrix, team.count());
+        let cuts = Cuts::new(&matrix.bounds, team.count());
         let halo = Halo::new(team.rank(), &cuts, |rank| read_by_rows(matrix, cuts.groups_of(rank)));
+        Self { team: team.clone(), cuts, halo }
+    }
+
+    /// The same in a window that begins with the `first` particle of the whole; `read_by` are all that a rank reads.
+    pub fn in_window(team: &Team, cuts: Cuts, first: usize, read_by: impl Fn(usize) -> Range<usize>) -> Self {
+        let halo = Halo::new(team.rank(), &cuts, |rank| vec![read_by(rank)]).here(first);
         Self { team: team.clone(), cuts, halo }
     }
 
@@ -270,7 +293,7 @@ mod tests {
     fn ranks_own_all_groups_once_and_about_as_much_each() {
         for matrix in matrices() {
             for ranks in 1..=7 {
-                let cuts = Cuts::new(&matrix, ranks);
+                let cuts = Cuts::new(&matrix.bounds, ranks);
                 let owned: Vec<usize> = (0..ranks).flat_map(|rank| cuts.groups_of(rank)).collect();
                 assert_eq!(owned, (0..matrix.groups()).collect::<Vec<_>>());
                 assert_eq!(cuts.is_shared(), ranks > 1 && matrix.groups() >= 2 * ranks);
@@ -285,7 +308,7 @@ mod tests {
     #[test]
     fn a_body_of_few_groups_stays_on_the_first_rank() {
         let matrix = Matrix::of_followers(&operator(LatticeKind::SAMPLES[0], 24, 17, |i| i < 9));
-        let cuts = Cuts::new(&matrix, 3);
+        let cuts = Cuts::new(&matrix.bounds, 3);
         assert!(!cuts.is_shared());
         assert_eq!([0, 1, 2].map(|rank| cuts.groups_of(rank).len()), [matrix.groups(), 0, 0]);
     }

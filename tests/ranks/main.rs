@@ -6,7 +6,7 @@ use std::thread;
 
 use flockform::continuum::equilibrium::{run_to_equilibrium_shared, run_to_equilibrium_watched};
 use flockform::continuum::plan::Plan;
-use flockform::continuum::run::{Outcome, SharedError, require_shareable, run_shared, run_watched};
+use flockform::continuum::run::{Outcome, SharedError, require_shareable, run_shared};
 use flockform::continuum::shares::{Exchanged, Shares};
 use flockform::engine::Engine;
 use flockform::engine::observer::Observer;
@@ -22,6 +22,7 @@ use scenes::{load, planned};
 
 mod changed;
 mod parts;
+mod rest;
 #[path = "../common/scenes.rs"]
 mod scenes;
 mod written;
@@ -105,7 +106,7 @@ fn on_ranks<T: Send>(count: usize, work: impl Fn(Team) -> T + Sync) -> Vec<T> {
 
 fn alone(scene: &Scene, every: usize) -> End {
     let mut looks = Looks::every(every);
-    let outcome = run_watched(planned(scene), &mut looks);
+    let outcome = run_to_equilibrium_watched(scene, planned(scene), &mut looks).expect("an end");
     End::of(&outcome, looks.seen)
 }
 
@@ -545,7 +546,7 @@ fn threads_within_ranks_change_no_bit() {
     assert!(ends.iter().all(|end| *end == expected));
 }
 
-/// Receives halos with an error in one coordinate.
+/// Receives halos with an error in one coordinate; lengths of messages are right.
 struct Noisy(Team);
 
 impl Exchange for Noisy {
@@ -564,7 +565,8 @@ impl Exchange for Noisy {
         meanwhile: &mut dyn FnMut(),
     ) -> Vec<Vec<u64>> {
         let mut received = self.0.swap_while(messages, from, meanwhile);
-        received.iter_mut().filter_map(|words| words.last_mut()).for_each(|word| *word ^= 1 << 20);
+        let coordinates = received.iter_mut().filter(|words| words.len() > 1);
+        coordinates.filter_map(|words| words.last_mut()).for_each(|word| *word ^= 1 << 20);
         received
     }
 

@@ -26,7 +26,7 @@ pub fn choose(system: &System, request: &Request) -> (Solver, String) {
     if let Choice::This(solver) = request.solver {
         return (solver, "asked for".into());
     }
-    let followers = system.operator.followers();
+    let followers = system.followers();
     if system.asymmetric_pair().is_some() {
         return choose_unsymmetric(followers, "neighbours do not feel each other alike");
     }
@@ -52,7 +52,7 @@ pub(super) fn falls_back(system: &System, request: &Request, from: Solver) -> bo
     request.solver == Choice::Auto
         && request.precision == Precision::F64
         && from != Solver::Direct
-        && system.operator.followers() <= FACTORISED_UP_TO
+        && system.followers() <= FACTORISED_UP_TO
 }
 
 /// The solver for so many followers whose operator has no symmetry, for the reason given.

@@ -10,7 +10,7 @@ use super::system::Prepared;
 use super::{Found, Precision, Request, SolveError, Solver, steps};
 use crate::flock::vectors::Vectors;
 use crate::solve::field::{Real, VectorsMut, VectorsRef, dot};
-use crate::solve::operator::{Matrix, RowCoefficients, RowRef};
+use crate::solve::operator::{Matrix, RowCoefficients};
 use crate::solve::stopwatch::Stopwatch;
 
 /// An approximation of `K^-1`, symmetric and positive.
@@ -43,8 +43,7 @@ pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found,
 /// The inverse of the largest stiffness: in single precision the rows are scaled by it, so that neither
 /// pascals nor parts of them overflow.
 pub(super) fn single_scale(matrix: &Matrix) -> f64 {
-    let largest = |row: RowRef<'_>| row.diagonal[0][0].abs().max(row.diagonal[1][1].abs());
-    1.0 / matrix.rows.iter().map(largest).fold(f64::MIN_POSITIVE, f64::max)
+    1.0 / matrix.largest().max(f64::MIN_POSITIVE)
 }
 
 /// The whole iteration in single precision: right-hand side and rows scaled to about 1.
@@ -65,7 +64,8 @@ pub(super) fn iterate_single<P: Preconditioner<f32>>(
     Ok(Found { displacement, ..found })
 }
 
-/// Conjugate gradients from zero. `right` becomes the residual. Ranks share the matrix, and all have the result.
+/// Conjugate gradients from zero. `right` becomes the residual. Ranks share the matrix, and all have the result, or each that of
+/// its window.
 pub(super) fn iterate<T: Real, P: Preconditioner<T>>(
     prepared: &Prepared,
     stencils: &RowCoefficients<T>,
@@ -79,7 +79,7 @@ pub(super) fn iterate<T: Real, P: Preconditioner<T>>(
     let mut r = right;
     let zeros = || Vectors::<T>::zeros(r.len());
     let (mut x, mut p, mut q) = (zeros(), zeros(), zeros());
-    let at_start = dot(r.view(), r.view()).sqrt();
+    let at_start = matrix.square(&r).sqrt();
     let (mut size, mut rz_before) = (at_start, f64::INFINITY);
     let set_up = begin.elapsed();
     let mut history = History::new(request);

@@ -10,15 +10,15 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
-use super::system::{Prepared, System};
+use super::system::Prepared;
 use super::{Found, SolveError, Solver, steps};
 use crate::flock::vectors::Vectors;
 use crate::solve::operator::{HELD, Matrix};
 use crate::solve::stopwatch::Stopwatch;
 
-pub(super) fn solve(prepared: &mut Prepared, system: &System) -> Result<Found, SolveError> {
+pub(super) fn solve(prepared: &mut Prepared) -> Result<Found, SolveError> {
     let begin = Stopwatch::start();
-    let symmetric = system.asymmetric_pair().is_none();
+    let symmetric = prepared.symmetric;
     let sparse = Sparse::new(&prepared.matrix, symmetric);
     let mut unknowns = sparse.unknowns(&prepared.right);
     let set_up = if symmetric {

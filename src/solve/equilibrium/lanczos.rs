@@ -7,11 +7,13 @@
 //! middle and the groups whose rows could carry most have it to next to nothing. Written here, as no crate has the
 //! coefficients of an iteration that the solver takes anyway.
 
+use std::collections::HashSet;
+
 use super::jacobi::row_sum;
 use super::steps::{Apply, precondition_group};
 use crate::flock::vectors::Vectors;
 use crate::solve::field::{Real, VectorsMut, dot};
-use crate::solve::operator::{Matrix, RowCoefficients, RowRef, pass};
+use crate::solve::operator::{Matrix, Name, RowCoefficients, RowRef, pass};
 
 /// Share of the first residual's square below which the next one is rounding.
 const EXHAUSTED: f64 = 1e-24;
@@ -38,12 +40,23 @@ fn samples(matrix: &Matrix) -> Vec<usize> {
     let rows_of = |group: usize| matrix.runs_of(group).iter().map(|run| run.class as usize);
     let mut seen = vec![false; matrix.rows.len()];
     samples.iter().flat_map(|&group| rows_of(group)).for_each(|row| seen[row] = true);
+    if let Some(team) = matrix.team() {
+        let own = matrix.names.iter().zip(&seen).filter(|(_, seen)| **seen).flat_map(|(name, _)| *name);
+        let all = team.gather_all(&own.collect::<Vec<_>>());
+        let all: HashSet<Name> = all.chunks_exact(2).map(|name| [name[0], name[1]]).collect();
+        seen.iter_mut().zip(&matrix.names).for_each(|(seen, name)| *seen = all.contains(name));
+    }
     let sum_of = |(row, seen): (RowRef<'_>, &bool)| if *seen { 0.0 } else { row_sum(row) };
     let sums: Vec<f64> = matrix.rows.iter().zip(&seen).map(sum_of).collect();
     let odd_of =
         |group: usize| rows_of(group).filter(|&row| !seen[row]).map(|row| sums[row]).reduce(f64::max);
     let mut odd: Vec<(f64, usize)> =
         (0..=last).filter_map(|group| odd_of(group).map(|sum| (sum, group))).collect();
+    if let Some(team) = matrix.team() {
+        let own: Vec<u64> = odd.iter().flat_map(|(sum, group)| [sum.to_bits(), *group as u64]).collect();
+        let all = team.gather_all(&own);
+        odd = all.chunks_exact(2).map(|of| (f64::from_bits(of[0]), of[1] as usize)).collect();
+    }
     odd.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     samples.extend(odd.iter().take(MOST_ODD).map(|&(_, group)| group));
     samples.sort_unstable();
@@ -89,7 +102,8 @@ fn bounds<T: Real>(matrix: &Matrix, stencils: &RowCoefficients<T>, groups: &[usi
 struct Krylov<'a, T> {
     matrix: &'a Matrix,
     stencils: &'a RowCoefficients<T>,
-    groups: &'a [usize],
+    /// Of these the ones that this rank owns, where each has a window of the matrix.
+    groups: Vec<usize>,
     r: Vectors<T>,
     z: Vectors<T>,
     p: Vectors<T>,
@@ -99,16 +113,18 @@ struct Krylov<'a, T> {
 
 impl<'a, T: Real> Krylov<'a, T> {
     /// Fields of zeros are not touched outside the groups, so they cost no memory there.
-    fn new(matrix: &'a Matrix, stencils: &'a RowCoefficients<T>, groups: &'a [usize]) -> Self {
+    fn new(matrix: &'a Matrix, stencils: &'a RowCoefficients<T>, groups: &[usize]) -> Self {
         let zeros = || Vectors::zeros(matrix.count());
         let (r, z, p, q) = (zeros(), zeros(), zeros(), zeros());
+        let is_own = |group: &usize| matrix.team().is_none() || matrix.own_groups().contains(group);
+        let groups: Vec<usize> = groups.iter().copied().filter(is_own).collect();
         let mut krylov = Self { matrix, stencils, groups, r, z, p, q, rz: 0.0 };
         // A fixed start without symmetry: the fractional parts of multiples of the golden ratio.
-        let noise = |i: u32| T::of((f64::from(i) * 0.618_033_988_749_895).fract() - 0.5);
-        for run in groups.iter().flat_map(|&group| matrix.runs_of(group)) {
-            for i in run.start..run.start + run.len {
-                krylov.r.x[i as usize] = noise(2 * i + 1);
-                krylov.r.y[i as usize] = noise(2 * i + 2);
+        let noise = |i: usize| T::of((i as f64 * 0.618_033_988_749_895).fract() - 0.5);
+        for run in krylov.groups.iter().flat_map(|&group| matrix.runs_of(group)) {
+            for i in run.start as usize..(run.start + run.len) as usize {
+                krylov.r.x[i] = noise(2 * (matrix.first() + i) + 1);
+                krylov.r.y[i] = noise(2 * (matrix.first() + i) + 2);
             }
         }
         krylov.precondition();
@@ -119,7 +135,10 @@ impl<'a, T: Real> Krylov<'a, T> {
 
     /// Step length, and the ratio of the residuals' squares; `None` once nothing is left.
     fn step(&mut self) -> Option<(f64, f64)> {
-        for &group in self.groups {
+        if self.matrix.team().is_some() {
+            self.matrix.receive(&mut self.p);
+        }
+        for &group in &self.groups {
             let out = part(&mut self.q, self.matrix, group);
             pass(self.matrix, self.stencils, group, self.p.view(), &mut Apply { out });
         }
@@ -130,20 +149,20 @@ impl<'a, T: Real> Krylov<'a, T> {
             return None;
         }
         let step = before / pq;
-        for &group in self.groups {
+        for &group in &self.groups {
             add_times(part(&mut self.r, self.matrix, group), (T::of(1.0), T::of(-step)), &self.q);
         }
         self.precondition();
         self.rz = self.product(&self.r, &self.z);
         let ratio = self.rz / before;
-        for &group in self.groups {
+        for &group in &self.groups {
             add_times(part(&mut self.p, self.matrix, group), (T::of(ratio), T::of(1.0)), &self.z);
         }
         (ratio > 0.0).then_some((step, ratio))
     }
 
     fn precondition(&mut self) {
-        for &group in self.groups {
+        for &group in &self.groups {
             let out = part(&mut self.z, self.matrix, group);
             precondition_group(self.matrix, self.stencils, (0.0, 1.0), self.r.view(), group, out);
         }
@@ -154,7 +173,14 @@ impl<'a, T: Real> Krylov<'a, T> {
             let range = self.matrix.bounds[group]..self.matrix.bounds[group + 1];
             dot(a.view().range(range.clone()), b.view().range(range))
         };
-        self.groups.iter().map(of_group).sum()
+        let own = self.groups.iter().map(of_group);
+        match self.matrix.team() {
+            None => own.sum(),
+            Some(team) => {
+                let own: Vec<u64> = own.map(f64::to_bits).collect();
+                team.gather_all(&own).into_iter().map(f64::from_bits).sum()
+            }
+        }
     }
 }
 

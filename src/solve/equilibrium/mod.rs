@@ -28,6 +28,7 @@ pub mod multigrid;
 mod rounding;
 pub(super) mod steps;
 mod system;
+mod windows;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -208,8 +209,8 @@ pub fn solve(system: &System, request: &Request) -> Result<Solved, SolveError> {
     solve_shared(system, request, None)
 }
 
-/// The same shared with the other ranks of a team, which all have the same system: the same bits on every one of them, and an
-/// interrupt of any ends all alike.
+/// The same shared with the other ranks of a team, which all have the same system, or each a part of it: the same bits on every
+/// one of them, and an interrupt of any ends all alike.
 pub fn solve_shared(system: &System, request: &Request, team: Option<&Team>) -> Result<Solved, SolveError> {
     let begin = Stopwatch::start();
     let allowed = request.tolerance > 0.0 && request.tolerance < 1.0;
@@ -218,13 +219,13 @@ pub fn solve_shared(system: &System, request: &Request, team: Option<&Team>) -> 
     }
     let (solver, why) = choose(system, request);
     check(system, request, solver)?;
-    let mut prepared = Prepared::new(system, team.cloned())?;
+    let mut prepared = Prepared::new(system, team, solver)?;
     let prepared_in = begin.elapsed();
     let can_fall_back = falls_back(system, request, solver);
     let most_iterations =
         if can_fall_back { request.most_iterations.min(PATIENCE) } else { request.most_iterations };
     let patient = Request { most_iterations, ..*request };
-    let found = by(solver, &mut prepared, system, &patient);
+    let found = by(solver, &mut prepared, &patient);
     let gives_up = match &found {
         Err(SolveError::NotPositive { .. }) => {
             Some(format!("{solver} took the body for unstable, which a factorisation finds out"))
@@ -236,9 +237,9 @@ pub fn solve_shared(system: &System, request: &Request, team: Option<&Team>) -> 
     };
     let (found, solver, why) = match gives_up.filter(|_| can_fall_back) {
         Some(why) => {
-            // The iteration has used up the right-hand side.
-            prepared.right = prepared.scaled_right(system);
-            (by(Solver::Direct, &mut prepared, system, request)?, Solver::Direct, why)
+            // The iteration has used up the right-hand side, and each rank has a window of its own.
+            prepared = Prepared::new(system, team, Solver::Direct)?;
+            (by(Solver::Direct, &mut prepared, request)?, Solver::Direct, why)
         }
         None => (found?, solver, why),
     };
@@ -254,8 +255,10 @@ pub fn solve_shared(system: &System, request: &Request, team: Option<&Team>) -> 
     let known_to = (!converged && ended && request.precision == Precision::F64)
         .then(|| rounding::known_to(&mut prepared, system, request, (solver, &found.displacement)))
         .flatten();
-    let displacement = system.with_held(prepared.unscaled(found.displacement));
-    if let Some(i) = displacement.iter().position(|u| !u.iter().all(|u| u.is_finite())) {
+    let found = prepared.in_system(system, found.displacement);
+    let displacement = system.with_held(prepared.unscaled(found));
+    let is_finite = |i: usize| displacement.get(i).iter().all(|u| u.is_finite());
+    if let Some([i, _]) = system.first_found(system.owned().find(|&i| !is_finite(i)).map(|i| [i, 0])) {
         return Err(SolveError::NotFinite { what: "displacement in equilibrium", particle: i + 1 });
     }
     Ok(Solved {
@@ -277,6 +280,8 @@ pub struct SolverShares {
     pub particles: Vec<usize>,
     /// The most that a rank receives of others before it applies the operator, in particles.
     pub received: usize,
+    /// Whether each sets up the whole: particles at no site are not set up in parts.
+    pub is_set_up_whole: bool,
 }
 
 /// How so many ranks would share a solve; `None` where each would solve the whole system.
@@ -285,43 +290,39 @@ pub fn shared_by(system: &System, solver: Solver, ranks: usize) -> Option<Solver
         return None;
     }
     let matrix = Matrix::of_followers(&system.operator);
-    let cuts = Cuts::new(&matrix, ranks);
+    let cuts = Cuts::new(&matrix.bounds, ranks);
     let received = |rank: usize| received_by(&matrix, &cuts, rank);
     let particles = (0..ranks).map(|rank| cuts.particles_of(rank).len()).collect();
-    Some(SolverShares { particles, received: (0..ranks).map(received).max().unwrap_or_default() })
+    let received = (0..ranks).map(received).max().unwrap_or_default();
+    Some(SolverShares { particles, received, is_set_up_whole: !matrix.outliers.places.is_empty() })
 }
 
 /// The result of a solver, which is the same on all ranks.
-fn by(
-    solver: Solver,
-    prepared: &mut Prepared,
-    system: &System,
-    request: &Request,
-) -> Result<Found, SolveError> {
-    let part = |team: &Team| Arc::new(Part::new(team, &prepared.matrix));
-    prepared.matrix.part = prepared.team.as_ref().filter(|_| solver.is_shared()).map(part);
-    let found = by_one(solver, prepared, system, request);
-    prepared.matrix.part = None;
+fn by(solver: Solver, prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
+    let is_whole = prepared.matrix.window.is_none();
+    if is_whole {
+        let part = |team: &Team| Arc::new(Part::new(team, &prepared.matrix));
+        prepared.matrix.part = prepared.team.as_ref().filter(|_| solver.is_shared()).map(part);
+    }
+    let found = by_one(solver, prepared, request);
+    if is_whole {
+        prepared.matrix.part = None;
+    }
     // Where each rank solves the whole system, one that is interrupted would leave the others waiting for it later on.
     let is_interrupted = found.as_ref().is_err_and(|error| *error == SolveError::Interrupted);
     let any = |team: &Team| team.any(is_interrupted);
     if prepared.team.as_ref().is_some_and(any) { Err(SolveError::Interrupted) } else { found }
 }
 
-fn by_one(
-    solver: Solver,
-    prepared: &mut Prepared,
-    system: &System,
-    request: &Request,
-) -> Result<Found, SolveError> {
+fn by_one(solver: Solver, prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
     match solver {
-        _ if prepared.size == 0.0 => Ok(Found::nothing(system.operator.count())),
+        _ if prepared.size == 0.0 => Ok(Found::nothing(prepared.matrix.count())),
         Solver::Jacobi => jacobi::solve(prepared, request),
         Solver::GaussSeidel => gauss_seidel::solve(prepared, request),
         Solver::Chebyshev => chebyshev::solve(prepared, request),
         Solver::ConjugateGradients => conjugate_gradients::solve(prepared, request),
         Solver::Multigrid => multigrid::solve(prepared, request),
-        Solver::Direct => direct::solve(prepared, system),
+        Solver::Direct => direct::solve(prepared),
     }
 }
 

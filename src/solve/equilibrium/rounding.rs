@@ -9,7 +9,6 @@
 use super::system::Prepared;
 use super::{Request, Solver, System, by, steps};
 use crate::flock::vectors::Vectors;
-use crate::solve::field::dot;
 
 /// Roundings of a row, as far as they do not cancel.
 const ROUNDINGS: f64 = 4.0;
@@ -37,10 +36,10 @@ pub(super) fn known_to(
     }
     (prepared.right, prepared.size) = (r, left);
     let request = Request { tolerance: ASKED, ..*request };
-    let error = by(solver, prepared, system, &request).ok()?;
-    let size = |field: &Vectors<f64>| dot(field.view(), field.view()).sqrt();
+    let error = by(solver, prepared, &request).ok()?;
     let solved = error.residuals.last().is_some_and(|last| *last <= ENOUGH);
-    solved.then(|| size(&error.displacement) / size(found)).filter(|part| part.is_finite())
+    let [of_error, of_found] = [&error.displacement, found].map(|field| prepared.matrix.square(field).sqrt());
+    Some(of_error / of_found).filter(|part| solved && part.is_finite())
 }
 
 /// `| |K| |u| + |f| |`: what the terms of a residual add up to before they cancel.

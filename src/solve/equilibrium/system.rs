@@ -1,12 +1,14 @@
 //! The system to be solved, from which every solver starts.
 
-use super::{SolveError, steps};
+use super::multigrid::transfer::Transfer;
+use super::{SolveError, Solver, steps, windows};
 use crate::flock::block::{apply, inverse};
 use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
-use crate::solve::field::dot;
 use crate::solve::operator::{HELD, Matrix, Operator, RowCoefficients, power_of_two};
-use std::sync::OnceLock;
+use crate::solve::shared::{SystemPart, moved};
+use std::ops::Range;
+use std::sync::{Arc, OnceLock};
 
 /// A body's operator, the forces on it and where its held particles are.
 #[derive(Clone, Debug)]
@@ -20,17 +22,64 @@ pub struct System {
     /// Whether its material hardly changes its volume: iterations are many then.
     pub is_nearly_incompressible: bool,
     asymmetric_pair: OnceLock<Option<[usize; 2]>>,
+    /// The part of this rank, where each has some particles of the system.
+    pub(crate) part: Option<SystemPart>,
+    /// Particles that follow, of all ranks.
+    followers: usize,
 }
 
 impl System {
     /// `forces` \[force\] and `held` displacements \[length\] of shape \[count\] each.
     pub fn new(operator: Operator, forces: Vectors, held: Vectors) -> Self {
-        Self { operator, forces, held, is_nearly_incompressible: false, asymmetric_pair: OnceLock::new() }
+        let followers = operator.followers();
+        let asymmetric_pair = OnceLock::new();
+        Self {
+            operator,
+            forces,
+            held,
+            is_nearly_incompressible: false,
+            asymmetric_pair,
+            part: None,
+            followers,
+        }
+    }
+
+    /// The same as a part of a system of which the other ranks have the others; for all of them together. A particle that is there
+    /// for those that this rank speaks for has the row that it has in the whole, if these lead to it.
+    pub(crate) fn of_part(mut self, part: SystemPart) -> Self {
+        let team = &part.team;
+        let [largest] = team.largest([self.operator.largest_stiffness(part.owned.clone())]);
+        self.operator = self.operator.scaled_to(largest);
+        let own = self.operator.follows()[part.owned.clone()].iter().filter(|&&follows| follows).count();
+        self.followers = team.sum([own as u64])[0] as usize;
+        self.part = Some(part);
+        self
+    }
+
+    /// Particles that follow.
+    pub fn followers(&self) -> usize {
+        self.followers
+    }
+
+    /// The particles that this rank speaks for; all of a whole system.
+    pub(super) fn owned(&self) -> Range<usize> {
+        self.part.as_ref().map_or(0..self.operator.count(), |part| part.owned.clone())
+    }
+
+    /// The first of what ranks find in their parts: particles by their number in the whole, and something more.
+    pub(super) fn first_found(&self, own: Option<[usize; 2]>) -> Option<[usize; 2]> {
+        let Some(part) = &self.part else { return own };
+        part.first_found(own.map(|[particle, more]| [part.first + particle, more]))
     }
 
     /// See [`Operator::asymmetric_pair`]; looked for once.
     pub fn asymmetric_pair(&self) -> Option<[usize; 2]> {
-        *self.asymmetric_pair.get_or_init(|| self.operator.asymmetric_pair())
+        let find = || {
+            let own = self.operator.asymmetric_pair(self.owned());
+            let first = self.part.as_ref().map_or(0, |part| part.first);
+            self.first_found(own.map(|[i, other]| [i, first + other]))
+        };
+        *self.asymmetric_pair.get_or_init(find)
     }
 
     pub(super) fn check(&self) -> Result<(), SolveError> {
@@ -38,13 +87,16 @@ impl System {
         if forces != particles || held != particles {
             return Err(SolveError::Shapes { forces, held, particles });
         }
-        for (i, &follows) in self.operator.follows().iter().enumerate() {
-            let (points, what) = if follows { (&self.forces, "force") } else { (&self.held, "displacement") };
-            if !points.get(i).iter().all(|value| value.is_finite()) {
-                return Err(SolveError::NotFinite { what, particle: i + 1 });
-            }
+        let given = [(&self.held, "displacement"), (&self.forces, "force")];
+        let is_wrong = |i: usize| {
+            let follows = usize::from(self.operator.follows()[i]);
+            let is_finite = given[follows].0.get(i).iter().all(|value| value.is_finite());
+            (!is_finite).then_some([i, follows])
+        };
+        match self.first_found(self.owned().find_map(is_wrong)) {
+            Some([i, follows]) => Err(SolveError::NotFinite { what: given[follows].1, particle: i + 1 }),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// The followers' displacements with those of the held particles.
@@ -117,9 +169,13 @@ impl System {
 /// brings them near 1: no square of a force or stiffness then over- or underflows, and no bit changes.
 pub(super) struct Prepared {
     pub matrix: Matrix,
+    /// Coarser grids that ranks share, where each of them has a window of all that is here.
+    pub coarser: Vec<(Transfer, Arc<Matrix>)>,
     stencils: OnceLock<RowCoefficients<f64>>,
     /// Right-hand side \[1\], shape \[count\].
     pub right: Vectors<f64>,
+    /// The same again, where it takes other ranks to find it anew.
+    kept_right: Option<Vectors<f64>>,
     /// `|right|` \[1\].
     pub size: f64,
     /// The powers of two that a displacement has to be multiplied by, one after the other.
@@ -133,30 +189,79 @@ pub(super) struct Prepared {
 }
 
 impl Prepared {
-    pub fn new(system: &System, team: Option<Team>) -> Result<Self, SolveError> {
+    /// For a solver; what the ranks of a `team` share of it, each has a part of.
+    pub fn new(system: &System, team: Option<&Team>, solver: Solver) -> Result<Self, SolveError> {
         let operator = &system.operator;
-        if operator.followers() == 0 {
+        if system.followers() == 0 {
             return Err(SolveError::NothingFollows);
         }
         let matrix = Matrix::of_followers(operator);
-        if let Some(i) = operator.adrift(&matrix) {
+        if let Some([i, _]) = adrift(system, &matrix) {
             return Err(SolveError::Adrift { particle: i + 1 });
         }
-        if let Some(i) = loose(&matrix) {
+        if let Some([i, _]) = system.first_found(loose(&matrix, system.owned()).map(|i| [i, 0])) {
             return Err(SolveError::Loose { particle: i + 1 });
         }
         let mut right = system.right_side(&matrix);
-        if let Some(i) = (0..right.len()).find(|&i| !right.get(i).iter().all(|f| f.is_finite())) {
+        let is_finite = |i: usize| right.get(i).iter().all(|f| f.is_finite());
+        if let Some([i, _]) = system.first_found(system.owned().find(|&i| !is_finite(i)).map(|i| [i, 0])) {
             return Err(SolveError::NotFinite { what: "pull on the held neighbours", particle: i + 1 });
         }
-        let force = power_of_two(right.x.iter().chain(&right.y).copied());
+        let owned = right.view().range(system.owned());
+        let most = owned.x.iter().chain(owned.y).fold(0.0, |most: f64, f| most.max(f.abs()));
+        let most = system.part.as_ref().map_or(most, |part| part.team.largest([most])[0]);
+        let force = power_of_two([most].into_iter());
         right.x.iter_mut().chain(&mut right.y).for_each(|f| *f /= force);
-        let size = dot(right.view(), right.view()).sqrt();
         let symmetric = system.asymmetric_pair().is_none();
         let scales = [1.0 / operator.stiffness, force];
         let length = power_of_two(operator.grid.as_flattened().iter().copied());
         let grid = operator.grid.map(|vector| vector.map(|v| v / length));
-        Ok(Self { matrix, stencils: OnceLock::new(), right, size, scales, grid, symmetric, team })
+        let team = team.cloned();
+        let (coarser, stencils, kept_right) = (Vec::new(), OnceLock::new(), None);
+        let mut prepared =
+            Self { matrix, coarser, stencils, right, kept_right, size: 0.0, scales, grid, symmetric, team };
+        prepared.share(system, solver);
+        prepared.size = prepared.matrix.square(&prepared.right).sqrt();
+        Ok(prepared)
+    }
+
+    /// Gives each rank what it needs of the system for a solver: a window, or of one that is not shared all.
+    fn share(&mut self, system: &System, solver: Solver) {
+        let is_shared = solver.is_shared() && self.matrix.outliers.places.is_empty();
+        let of_whole = |team: &Team| SystemPart::of_whole(team, &self.matrix.columns);
+        let of_whole = self.team.as_ref().filter(|_| is_shared).map(of_whole);
+        let Some(part) = system.part.clone().or(of_whole) else { return };
+        let count = self.matrix.count();
+        let matrix = std::mem::replace(&mut self.matrix, Matrix::nothing());
+        (self.matrix, self.coarser) = match is_shared {
+            true => windows::of_part(&part, matrix, (solver == Solver::Multigrid, self.grid)),
+            false => (windows::whole_of_part(&part, matrix), Vec::new()),
+        };
+        let first = self.matrix.first();
+        let wanted = first..first + self.matrix.count();
+        let wanted = part.team.each([wanted.start as u64, wanted.end as u64]);
+        let wanted: Vec<_> = wanted.into_iter().map(|[start, end]| start as usize..end as usize).collect();
+        let owned = part.of_each(part.owned.clone());
+        let right = std::mem::take(&mut self.right);
+        debug_assert_eq!(right.len(), count);
+        self.right = moved(&part.team, (&owned, &wanted), (&right, part.first));
+        self.kept_right = Some(self.right.clone());
+        self.team = Some(part.team);
+    }
+
+    /// The displacements of the particles that stand here in the system.
+    pub fn in_system(&self, system: &System, found: Vectors<f64>) -> Vectors<f64> {
+        let first = system.part.as_ref().map_or(0, |part| part.first);
+        let here = first..first + system.operator.count();
+        let (Some(team), Some(window)) = (&self.team, &self.matrix.window) else {
+            let Some(_) = system.part else { return found };
+            return Vectors { x: found.x[here.clone()].to_vec(), y: found.y[here].to_vec() };
+        };
+        let cuts = &self.matrix.part.as_ref().expect("a window is a part").cuts;
+        let owned: Vec<_> = (0..team.count()).map(|rank| cuts.particles_of(rank)).collect();
+        let wanted = team.each([here.start as u64, here.end as u64]);
+        let wanted: Vec<_> = wanted.into_iter().map(|[start, end]| start as usize..end as usize).collect();
+        moved(team, (&owned, &wanted), (&found, window.first))
     }
 
     /// The rows as the passes of an iteration read them.
@@ -174,6 +279,9 @@ impl Prepared {
 
     /// The right-hand side anew, for solvers use it up \[1\].
     pub fn scaled_right(&self, system: &System) -> Vectors<f64> {
+        if let Some(right) = &self.kept_right {
+            return right.clone();
+        }
         let mut right = system.right_side(&self.matrix);
         right.x.iter_mut().chain(&mut right.y).for_each(|f| *f /= self.scales[1]);
         right
@@ -187,11 +295,17 @@ impl Prepared {
     }
 }
 
-/// The first particle, counted from 0, that its own row does not hold back.
-fn loose(matrix: &Matrix) -> Option<usize> {
+/// See [`Operator::adrift`].
+fn adrift(system: &System, matrix: &Matrix) -> Option<[usize; 2]> {
+    let Some(part) = &system.part else { return system.operator.adrift(matrix).map(|i| [i, 0]) };
+    system.first_found(system.operator.adrift_of_part(matrix, part).map(|i| [i, 0]))
+}
+
+/// The first of these particles, counted from 0, that its own row does not hold back.
+fn loose(matrix: &Matrix, mut of: Range<usize>) -> Option<usize> {
     let loose: Vec<bool> = matrix.rows.iter().map(|row| inverse(row.diagonal).is_none()).collect();
     // A class whose every particle has a held neighbour was replaced by others, and has no particles left.
     let any = loose.contains(&true);
-    let is_loose = |&class: &u32| class != HELD && loose[class as usize];
-    if any { matrix.class.iter().position(is_loose) } else { None }
+    let is_loose = |i: &usize| matrix.class[*i] != HELD && loose[matrix.class[*i] as usize];
+    if any { of.find(is_loose) } else { None }
 }

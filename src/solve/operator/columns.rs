@@ -13,6 +13,13 @@ pub struct Segment {
     pub len: u32,
 }
 
+impl Segment {
+    /// Whether a particle with this number in this row is the next one.
+    fn ends_before(&self, row: i32, index: usize, step: i32) -> bool {
+        self.row + self.len as i32 * step == row && (self.start + self.len) as usize == index
+    }
+}
+
 /// The columns of a body as segments.
 #[derive(Clone, Debug, Default)]
 pub struct Columns {
@@ -20,6 +27,8 @@ pub struct Columns {
     first: i32,
     /// Rows from one particle of a segment to the next.
     step: i32,
+    /// Whether any column has two particles.
+    knows_step: bool,
     /// Where the segments of each column begin, shape \[columns + 1\].
     starts: Vec<u32>,
     segments: Vec<Segment>,
@@ -37,7 +46,13 @@ impl Columns {
     pub fn new(sites: impl Iterator<Item = Site> + Clone, counts: impl Fn(usize) -> bool) -> Self {
         let mut steps = sites.clone().zip(sites.clone().skip(1)).filter(|(a, b)| a[0] == b[0]);
         // The sites of a column are evenly spaced on every lattice, so that the first few suffice.
-        let step = steps.by_ref().take(4096).map(|(a, b)| b[1] - a[1]).min().unwrap_or(1).max(1);
+        let step = steps.by_ref().take(4096).map(|(a, b)| b[1] - a[1]).min();
+        let known = step.is_some();
+        Self { knows_step: known, ..Self::with_step(step.unwrap_or(1).max(1), sites, counts) }
+    }
+
+    /// The same of columns whose particles stand so many rows apart, where none is missing.
+    pub fn with_step(step: i32, sites: impl Iterator<Item = Site>, counts: impl Fn(usize) -> bool) -> Self {
         let mut columns = Self { step, ..Self::default() };
         // The site before, if it ended a segment that may go on.
         let mut last: Option<Site> = None;
@@ -59,9 +74,38 @@ impl Columns {
             }
             last = Some(site);
         }
-        columns.starts.push(columns.segments.len() as u32);
-        columns.begins.push(count as u32);
+        columns.end(count);
         columns
+    }
+
+    /// None yet, the first one of which will have this number; see [`Columns::open_next`] and [`Columns::end`].
+    pub fn from_number(first: i32, step: i32) -> Self {
+        Self { first, step, ..Self::default() }
+    }
+
+    /// Begins the next column, the particle `index` being the next.
+    pub fn open_next(&mut self, index: usize) {
+        self.begins.push(index as u32);
+        self.starts.push(self.segments.len() as u32);
+    }
+
+    /// Adds so many particles from this row on to the column that was begun last.
+    pub fn push(&mut self, row: i32, index: usize, len: usize) {
+        let begun = self.starts.last().map_or(0, |&start| start as usize);
+        match self.segments[begun..].last_mut() {
+            Some(last) if last.ends_before(row, index, self.step) => last.len += len as u32,
+            _ => self.segments.push(Segment { row, start: index as u32, len: len as u32 }),
+        }
+    }
+
+    /// Ends the last column of so many particles in all.
+    pub fn end(&mut self, count: usize) {
+        self.open_next(count);
+    }
+
+    /// The number of the column that a particle is in.
+    pub fn column_of(&self, index: usize) -> i32 {
+        self.first + self.begins.partition_point(|&begin| begin as usize <= index) as i32 - 1
     }
 
     /// Begins the columns up to `column`, the particle `index` being the next.
@@ -82,6 +126,11 @@ impl Columns {
 
     pub fn step(&self) -> i32 {
         self.step
+    }
+
+    /// The same, where a column has particles to tell it by.
+    pub fn known_step(&self) -> Option<i32> {
+        self.knows_step.then_some(self.step)
     }
 
     /// Indices of the particles of these columns of the lattice, as far as there are any.
@@ -149,27 +198,32 @@ impl Columns {
             .then(|| ((segment.start as i32 + steps) as usize, (segment.len as i32 - steps) as usize))
     }
 
-    /// Index bounds of groups of whole columns that cost at least `size` but for the last, with the number of the column that
-    /// each begins with: `[begin of the first, ..., end of the last]`. `cost` is that of the particles before each and of all,
-    /// shape \[count + 1\]. Particles along an outline fill up the last one; what is left of them are groups without columns.
-    pub fn groups(&self, size: u32, cost: &[u32]) -> (Vec<usize>, Vec<i32>) {
-        let (mut bounds, mut columns) = (vec![0], vec![self.first]);
-        let all = cost[cost.len() - 1];
-        let (&regular, begins) = self.begins.split_last().expect("an end");
-        let outliers = (regular..cost.len() as u32 - 1).map(|begin| (self.range().end, begin));
-        for (column, begin) in (self.first..).zip(begins.iter().copied()).chain(outliers) {
-            let done = cost[begin as usize];
-            if done - cost[bounds[bounds.len() - 1]] >= size && done < all {
-                bounds.push(begin as usize);
-                columns.push(column);
-            }
-        }
-        if cost.len() > 1 {
-            bounds.push(cost.len() - 1);
-            columns.push(self.range().end);
-        }
-        (bounds, columns)
+    /// The columns of the lattice, each with the index of its first particle, and the end of the last one.
+    pub fn begins(&self) -> impl Iterator<Item = (i32, usize)> + '_ {
+        (self.first..).zip(self.begins.iter().map(|&begin| begin as usize))
     }
+}
+
+/// A column, the index of its first particle, and what all particles before it cost.
+pub type Begin = (i32, usize, u64);
+
+/// Index bounds of groups of whole columns that cost at least `size` but for the last, with the number of the column that
+/// each begins with: `[begin of the first, ..., end of the last]`. Where a particle along an outline is a column, these fill up
+/// the last group; what is left of them are groups without columns.
+pub fn groups(begins: impl Iterator<Item = Begin>, end: Begin, size: u64) -> (Vec<usize>, Vec<i32>) {
+    let (mut bounds, mut columns, mut before) = (Vec::new(), Vec::new(), 0);
+    for (column, begin, cost) in begins {
+        if bounds.is_empty() || (cost - before >= size && cost < end.2) {
+            bounds.push(begin);
+            columns.push(column);
+            before = cost;
+        }
+    }
+    if bounds.is_empty() || end.1 > 0 {
+        bounds.push(end.1);
+        columns.push(end.0);
+    }
+    (bounds, columns)
 }
 
 #[cfg(test)]
@@ -194,8 +248,8 @@ mod tests {
                     assert_eq!(columns.find([i, j]).map(|(index, _)| index), there, "{kind:?} {i} {j}");
                 }
             }
-            let cost: Vec<u32> = (0..=body.count() as u32).collect();
-            let (bounds, _) = columns.groups(30, &cost);
+            let begins = columns.begins().map(|(column, begin)| (column, begin, begin as u64));
+            let (bounds, _) = groups(begins, (13, body.count(), body.count() as u64), 30);
             assert!(bounds.windows(2).all(|w| w[0] < w[1]), "{bounds:?}");
         }
     }

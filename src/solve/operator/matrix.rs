@@ -5,33 +5,50 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::columns::Columns;
+use super::columns::{Columns, groups};
 use super::packs::Packs;
 use super::rows::{RowRef, Rows};
+use super::window::{Census, Name, Window, name_of};
 use super::{Operator, Outliers, Stretch, add};
 use crate::flock::block::Block;
 use crate::flock::body::Body;
 use crate::flock::lattice::Site;
 use crate::flock::vectors::Vectors;
-use crate::solve::field::{Real, VectorsMut};
+use crate::ranks::Team;
+use crate::solve::field::{Real, VectorsMut, dot};
 use crate::solve::part::Part;
 
 /// Class of particles that do not follow.
 pub const HELD: u32 = u32::MAX;
 
 /// About how many particles a thread is given at a time: their vectors stay in its second cache over a few loops.
-const GROUP: u32 = 1 << 13;
+const GROUP: u64 = 1 << 13;
 
 /// What a particle in a pack costs, in particles of long runs.
 const PACKED: u32 = 3;
 
 /// Cost that is one thread's alone: two would wait for each other longer than they save.
-const ALONE: u32 = 20_000;
+const ALONE: u64 = 20_000;
+
+#[cfg(test)]
+thread_local! {
+    /// Least cost of the groups of this thread's matrices, for small bodies to have several.
+    pub static SIZE: std::cell::Cell<Option<u64>> = const { std::cell::Cell::new(None) };
+}
 
 /// Least cost of a group, of what all cost: one group up to [`ALONE`], and an even number of about as large ones above.
-fn group_size(cost: u32) -> u32 {
+pub(super) fn group_size(cost: u64) -> u64 {
+    #[cfg(test)]
+    if let Some(size) = SIZE.get() {
+        return size;
+    }
     let groups = if cost <= ALONE { 1 } else { 2 * ((cost + GROUP) / (2 * GROUP)) };
     cost.div_ceil(groups).max(1)
+}
+
+/// What each of so many consecutive particles of one class costs, in particles of long runs.
+pub(super) fn cost_of_each(len: u32) -> u32 {
+    if len < LONG { PACKED } else { 1 }
 }
 
 /// Consecutive particles of one class whose neighbours lie at the same index distances.
@@ -65,6 +82,8 @@ pub struct Matrix {
     /// Row of each particle, [`HELD`] where it does not follow, shape \[count\].
     pub class: Vec<u32>,
     pub rows: Rows,
+    /// Of each row, the same wherever it is computed; empty of a coarser grid that one rank has whole.
+    pub names: Vec<Name>,
     runs: Vec<Run>,
     distances: Vec<i32>,
     /// Index bounds of the groups of columns that threads work on, shape \[groups + 1\].
@@ -78,6 +97,8 @@ pub struct Matrix {
     pub outliers: Outliers,
     /// The part of this rank while several iterate with it; what they compute outside it is not known here.
     pub part: Option<Arc<Part>>,
+    /// The matrix that this is some columns of.
+    pub window: Option<Window>,
 }
 
 impl Matrix {
@@ -95,37 +116,112 @@ impl Matrix {
     }
 
     fn of_runs(columns: Columns, class: Vec<u32>, rows: Rows, Runs { runs, distances, .. }: Runs) -> Self {
+        let names = Vec::new();
+        let mut matrix = Self { runs, distances, ..Self::uncompiled(columns, class, (rows, names)) };
+        matrix.group(group_size);
+        matrix
+    }
+
+    /// The matrix of no particle.
+    pub fn nothing() -> Self {
+        Self::uncompiled(Columns::default(), Vec::new(), (Rows::default(), Vec::new()))
+    }
+
+    /// The same without the runs that passes go over.
+    pub fn uncompiled(columns: Columns, class: Vec<u32>, (rows, names): (Rows, Vec<Name>)) -> Self {
         let outliers = Outliers { first: class.len(), ..Outliers::default() };
-        let mut matrix = Self {
+        Self {
             columns,
             class,
             rows,
-            runs,
-            distances,
+            names,
+            runs: Vec::new(),
+            distances: Vec::new(),
             bounds: Vec::new(),
             group_columns: Vec::new(),
             group_runs: Vec::new(),
             packs: Packs::default(),
             outliers,
             part: None,
-        };
-        matrix.group(group_size);
-        matrix
+            window: None,
+        }
+    }
+
+    /// Compiles the rows of the groups of this rank, of a matrix of which it has the columns that they lead to.
+    pub fn in_window(mut self, census: &Arc<Census>, part: impl FnOnce(usize) -> Part) -> Self {
+        let first = if self.count() == 0 { 0 } else { census.particles(self.columns.range()).start };
+        let part = part(first);
+        let (bounds, group_columns) = census.groups();
+        let [begin, end] = [part.groups().start, part.groups().end].map(|group| group_columns[group]);
+        let mut runs = Runs::default();
+        for (column, segment) in self.columns.iter().filter(|(column, _)| (begin..end).contains(column)) {
+            let rows = (&self.columns, &self.class[..], &self.rows);
+            runs.find(rows, [column, segment.row], segment.start..segment.start + segment.len);
+        }
+        (self.runs, self.distances) = (runs.runs, runs.distances);
+        self.bounds = bounds.iter().map(|bound| bound.saturating_sub(first).min(self.count())).collect();
+        self.group_columns = group_columns;
+        self.window = Some(Window { first, census: census.clone(), largest: 0.0 });
+        self.part = Some(Arc::new(part));
+        self.pack();
+        self
+    }
+
+    /// The same with the largest entry on the diagonal of a row of any rank.
+    pub fn with_largest(mut self, team: &Team) -> Self {
+        let own = self.runs.iter().map(|run| largest_on_diagonal(self.rows.of(run.class)));
+        let [largest] = team.largest([own.fold(0.0, f64::max)]);
+        self.window.iter_mut().for_each(|window| window.largest = largest);
+        self
+    }
+
+    /// The largest entry on the diagonal of a row.
+    pub fn largest(&self) -> f64 {
+        let of_rows = || self.rows.iter().map(largest_on_diagonal).fold(0.0, f64::max);
+        self.window.as_ref().map_or_else(of_rows, |window| window.largest)
+    }
+
+    /// The index in the whole matrix of the first particle that stands here.
+    pub fn first(&self) -> usize {
+        self.window.as_ref().map_or(0, |window| window.first)
+    }
+
+    /// The ranks that have windows of this matrix and groups of it, if it is more than one.
+    pub fn team(&self) -> Option<&Team> {
+        self.window.as_ref()?;
+        self.part.as_ref().filter(|part| part.is_shared()).map(|part| &part.team)
+    }
+
+    /// Indices, in the whole matrix, of the particles of these columns.
+    pub fn particles_of(&self, columns: Range<i32>) -> Range<usize> {
+        match &self.window {
+            Some(window) => window.census.particles(columns),
+            None => self.columns.particles(columns),
+        }
     }
 
     /// Cuts the body into groups that cost at least `size` of what all cost.
-    fn group(&mut self, size: impl FnOnce(u32) -> u32) {
+    fn group(&mut self, size: impl FnOnce(u64) -> u64) {
         let mut cost = vec![0; self.count() + 1];
         for run in &self.runs {
-            let each = if run.is_packed() { PACKED } else { 1 };
-            cost[run.start as usize + 1..][..run.len as usize].fill(each);
+            cost[run.start as usize + 1..][..run.len as usize].fill(cost_of_each(run.len));
         }
         let mut sum = 0;
         for cost in &mut cost {
             sum += *cost;
             *cost = sum;
         }
-        (self.bounds, self.group_columns) = self.columns.groups(size(sum), &cost);
+        let (after, regular) = (self.columns.range().end, self.columns.particles(self.columns.range()).end);
+        let outliers = (regular + 1..self.count()).map(|begin| (after, begin));
+        let begins = self.columns.begins().chain(outliers);
+        let begins = begins.map(|(column, begin)| (column, begin, u64::from(cost[begin])));
+        let sum = u64::from(sum);
+        (self.bounds, self.group_columns) = groups(begins, (after, self.count(), sum), size(sum));
+        self.pack();
+    }
+
+    /// Finds the runs of each group, and packs the short ones.
+    fn pack(&mut self) {
         let first = |&bound: &usize| self.runs.partition_point(|run| (run.start as usize) < bound);
         self.group_runs = self.bounds.iter().map(first).collect();
         self.packs = Packs::new(self);
@@ -133,7 +229,7 @@ impl Matrix {
 
     /// The same in groups of another size.
     #[cfg(test)]
-    pub fn regrouped(mut self, size: u32) -> Self {
+    pub fn regrouped(mut self, size: u64) -> Self {
         self.group(|_| size);
         self
     }
@@ -143,6 +239,7 @@ impl Matrix {
         let columns = Columns::new(operator.columns.sites(), |i| operator.follows[i]);
         let mut class = vec![HELD; operator.count()];
         let mut rows = Rows::sharing(&operator.rows);
+        let mut names = operator.names.clone();
         let (mut known, mut runs, mut distances) = (HashMap::new(), Runs::default(), Vec::new());
         // How many particles before each have something held.
         let mut held = vec![0u32];
@@ -172,6 +269,8 @@ impl Matrix {
                 class[start + k] =
                     *known.entry((full, free, follows)).or_insert_with_key(|(full, free, follows)| {
                         push_without_held(&mut rows, operator.rows.of(*full), free, follows);
+                        let flags = free.iter().flatten().chain(follows).map(|&flag| u64::from(flag));
+                        names.push(name_of(operator.names[*full as usize].into_iter().chain(flags)));
                         rows.len() as u32 - 1
                     });
             }
@@ -179,7 +278,7 @@ impl Matrix {
             None
         });
         let outliers = operator.outliers.clone();
-        Self { outliers, ..Self::of_runs(columns, class, rows, runs) }
+        Self { outliers, names, ..Self::of_runs(columns, class, rows, runs) }
     }
 
     pub fn count(&self) -> usize {
@@ -188,6 +287,16 @@ impl Matrix {
 
     pub fn groups(&self) -> usize {
         self.bounds.len() - 1
+    }
+
+    /// The square of a vector over all groups.
+    pub fn square<T: Real>(&self, v: &Vectors<T>) -> f64 {
+        let of_group = |ends: &[usize]| {
+            let v = v.view().range(ends[0]..ends[1]);
+            dot(v, v)
+        };
+        let own = self.own_groups();
+        self.sum(&self.bounds[own.start..=own.end].windows(2).map(of_group).collect::<Vec<_>>())
     }
 
     /// The groups that this rank computes.
@@ -218,10 +327,12 @@ impl Matrix {
         }
     }
 
-    /// Makes the whole vector known to every rank.
+    /// Makes the whole vector known to every rank; where each has a window, what the rows of its particles lead to.
     pub fn gather<T: Real>(&self, v: &mut Vectors<T>) {
-        if let Some(part) = &self.part {
-            part.gather(v);
+        match &self.part {
+            Some(part) if self.window.is_some() => part.receive(v),
+            Some(part) => part.gather(v),
+            None => (),
         }
     }
 
@@ -246,6 +357,10 @@ impl Matrix {
         let entries = entries.filter(|(offset, _)| !leads_to_outlier(*offset));
         entries.fold([0, 0], |far, (o, _)| [far[0].max(o[0].abs()), far[1].max(o[1].abs())])
     }
+}
+
+fn largest_on_diagonal(row: RowRef<'_>) -> f64 {
+    row.diagonal[0][0].abs().max(row.diagonal[1][1].abs())
 }
 
 /// Runs that are being found.

@@ -4,6 +4,7 @@
 //! different pattern of them is a class, and its row is computed once.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use super::sums::Sums;
 use super::transfer::{OutlierShares, Transfer, parents_of_place};
@@ -11,7 +12,7 @@ use crate::flock::block::Block;
 use crate::flock::body::Body;
 use crate::flock::lattice::Site;
 use crate::solve::equilibrium::steps::in_pieces;
-use crate::solve::operator::{Columns, HELD, Matrix, Outliers, RowRef, Rows, leads_to_outlier};
+use crate::solve::operator::{Columns, HELD, Matrix, Outliers, RowRef, Rows, leads_to_outlier, name_of};
 
 /// How much coarser the first grid is than the lattice, in particles per node.
 const FIRST_RATIO: f64 = 4.0;
@@ -97,22 +98,46 @@ pub fn coarsen(fine: &Matrix, transfer: Transfer) -> (Matrix, OutlierShares) {
         }
         rows
     });
-    pieces.extend(in_pieces(&patterns, PIECE, |patterns| {
-        let (mut rows, mut sums) = (Rows::with_capacity(patterns.len(), NEIGHBOURS), Sums::default());
-        for pattern in patterns {
-            galerkin(fine, &parents, pattern, &mut sums);
-            rows.push_blocks(sums.drain());
-        }
-        rows
-    }));
+    pieces.extend(rows_of(fine, &parents, &patterns));
     // Ascending lists one after the other, which a stable sort joins.
     nodes.sort();
-    let columns = Columns::new(nodes.iter().map(|&(site, _)| site), |_| true);
+    let columns = Columns::with_step(STEP, nodes.iter().map(|&(site, _)| site), |_| true);
     let shares = of_outliers.shares(&nodes);
     (
         Matrix::compile(columns, nodes.into_iter().map(|(_, class)| class).collect(), Rows::joined(pieces)),
         shares,
     )
+}
+
+/// Rows of a column from one node to the next.
+pub const STEP: i32 = 1;
+
+/// Some columns of the coarse grid of a body without particles at no site, with what they need of the fine one at hand.
+pub fn coarsen_columns(fine: &Matrix, transfer: Transfer, columns: Range<i32>) -> Matrix {
+    let mut patterns = Patterns::new(fine, transfer);
+    let mut nodes: Vec<(Site, u32)> = Vec::new();
+    for column in columns {
+        let mut node = |row, class| nodes.extend(Option::map(class, |class| ([column, row], class)));
+        patterns.column(fine, column, |_| false, &mut node);
+    }
+    let patterns: Vec<&[u32]> = patterns.iter().collect();
+    let name = |class: &u32| fine.names.get(*class as usize).copied().unwrap_or_default();
+    let names = patterns.iter().map(|pattern| name_of(pattern.iter().flat_map(name))).collect();
+    let rows = Rows::joined(rows_of(fine, &Parents::new(transfer.steps), &patterns));
+    let columns = Columns::with_step(STEP, nodes.iter().map(|&(site, _)| site), |_| true);
+    Matrix::uncompiled(columns, nodes.into_iter().map(|(_, class)| class).collect(), (rows, names))
+}
+
+/// The rows of nodes with these surroundings, piece by piece.
+fn rows_of(fine: &Matrix, parents: &Parents, patterns: &[&[u32]]) -> Vec<Rows> {
+    in_pieces(patterns, PIECE, |patterns| {
+        let (mut rows, mut sums) = (Rows::with_capacity(patterns.len(), NEIGHBOURS), Sums::default());
+        for pattern in patterns {
+            galerkin(fine, parents, pattern, &mut sums);
+            rows.push_blocks(sums.drain());
+        }
+        rows
+    })
 }
 
 /// The nodes around the particles that stand at no site.

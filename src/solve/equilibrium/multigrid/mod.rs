@@ -11,17 +11,18 @@
 //!   largest eigenvalue of each level.
 //! * The coarsest level is solved outright (`envelope`).
 //! * Ranks share each level by groups of its columns. Where these become few, the first rank does what is left of the
-//!   way down and back up, and the others wait for it: it would take less time than their exchanges.
+//!   way down and back up, and the others wait for it: it would take less time than their exchanges. Of a level that they share
+//!   each has the columns that it needs (`windows`), unless the body has particles at no site: then each has all of them.
 //!
 //! The cycle runs in single precision: it begins at zero and its result is only a direction, so what
 //! rounding does to it costs no digit of the equilibrium; the iteration around it runs in double precision.
 
-mod coarsen;
+pub(super) mod coarsen;
 mod envelope;
 mod sums;
 #[cfg(test)]
 mod tests;
-mod transfer;
+pub(super) mod transfer;
 
 use std::sync::Arc;
 
@@ -56,8 +57,10 @@ const SMOOTHED: f64 = 5.0;
 pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
     let begin = Stopwatch::start();
     let right = std::mem::take(&mut prepared.right);
-    let (cycle, _) = side_by_side(|| Cycle::new(&prepared.matrix, prepared.grid), || prepared.stencils());
-    let mut cycle = cycle?;
+    let mut cycle = match prepared.matrix.window {
+        None => side_by_side(|| Cycle::new(&prepared.matrix, prepared.grid), || prepared.stencils()).0,
+        Some(_) => Cycle::in_windows(prepared),
+    }?;
     let set_up = begin.elapsed();
     tracing::debug!(levels = cycle.levels.len() + 1, "multigrid is set up");
     let found = match request.precision {
@@ -89,7 +92,7 @@ struct Cycle<'a> {
 struct Level {
     transfer: Transfer,
     outliers: OutlierShares,
-    matrix: Matrix,
+    matrix: Arc<Matrix>,
     vectors: LevelVectors,
     /// Between ranks, where they share the levels.
     transfers: Option<Transfers>,
@@ -112,7 +115,7 @@ impl Transfers {
         let read_up = |rank: usize| transfer.prolonged_from(levels, outliers, &fine.groups_of(rank));
         let rank = team.rank();
         let (down, up) = (Halo::new(rank, fine, read_down), Halo::new(rank, coarse, read_up));
-        Self { team, down, up }
+        Self { team, down: down.here(levels.0.first()), up: up.here(levels.1.first()) }
     }
 }
 
@@ -150,16 +153,61 @@ impl Smoother {
     }
 }
 
+const NOT_POSITIVE: SolveError = SolveError::NotPositive { solver: Solver::Multigrid, iteration: 0 };
+
+/// Columns and rows \[length\].
+pub(super) fn spacing_of(grid: [[f64; 2]; 2]) -> [f64; 2] {
+    grid.map(|v| v[0].hypot(v[1]))
+}
+
+/// Whether a level of so many nodes, in as many columns and rows, is to be solved outright.
+pub(super) fn is_coarse_enough((count, extent): (usize, [i32; 2]), is_finest: bool) -> bool {
+    let is_slender = extent.iter().any(|&nodes| nodes <= ACROSS);
+    count <= COARSEST || (!is_finest && is_slender)
+}
+
 impl<'a> Cycle<'a> {
-    fn new(matrix: &'a Matrix, grid: [[f64; 2]; 2]) -> Result<Self, SolveError> {
-        let scale = single_scale(matrix);
-        let not_positive = SolveError::NotPositive { solver: Solver::Multigrid, iteration: 0 };
+    fn of_finest(matrix: &'a Matrix) -> Self {
         let vectors = LevelVectors::new(matrix.count());
-        let mut cycle = Self { matrix, vectors, smoothers: Vec::new(), levels: Vec::new(), coarsest: None };
-        let mut spacing = grid.map(|v| v[0].hypot(v[1]));
-        while !cycle.is_coarse_enough() {
-            let fine = cycle.levels.last().map_or(matrix, |level| &level.matrix);
-            let steps = match cycle.levels.len() {
+        Self { matrix, vectors, smoothers: Vec::new(), levels: Vec::new(), coarsest: None }
+    }
+
+    fn new(matrix: &'a Matrix, grid: [[f64; 2]; 2]) -> Result<Self, SolveError> {
+        let mut cycle = Self::of_finest(matrix);
+        cycle.go_down(single_scale(matrix), grid, spacing_of(grid))?;
+        Ok(cycle)
+    }
+
+    /// The same where each rank has windows of the levels that they share; the first one goes on alone.
+    fn in_windows(prepared: &'a Prepared) -> Result<Self, SolveError> {
+        let (matrix, grid) = (&prepared.matrix, prepared.grid);
+        let mut cycle = Self::of_finest(matrix);
+        let (scale, mut spacing) = (single_scale(matrix), spacing_of(grid));
+        let mut of_levels = || {
+            for (transfer, coarse) in &prepared.coarser {
+                let fine = cycle.coarsest_matrix();
+                let smoother = Smoother::new(fine, scale).ok_or(NOT_POSITIVE)?;
+                let level = Level::in_window(fine, coarse, *transfer);
+                cycle.smoothers.push(smoother);
+                spacing = [0, 1].map(|k| spacing[k] * f64::from(transfer.steps[k]));
+                cycle.levels.push(level);
+            }
+            let is_left_to_this = !cycle.coarsest_matrix().own_groups().is_empty();
+            if is_left_to_this { cycle.go_down(scale, grid, spacing) } else { Ok(()) }
+        };
+        let is_over = of_levels().is_err();
+        let any = prepared.team.as_ref().is_some_and(|team| team.any(is_over));
+        if any { Err(NOT_POSITIVE) } else { Ok(cycle) }
+    }
+
+    /// Adds the levels from here on, each of which this rank has whole; nodes are `spacing` apart.
+    fn go_down(&mut self, scale: f64, grid: [[f64; 2]; 2], mut spacing: [f64; 2]) -> Result<(), SolveError> {
+        loop {
+            let fine = self.coarsest_matrix();
+            if is_coarse_enough((fine.count(), fine.columns.extent()), self.levels.is_empty()) {
+                break;
+            }
+            let steps = match self.levels.len() {
                 0 => coarsen::first_steps(grid, particles_per_site(fine)),
                 _ => coarsen::next_steps(spacing),
             };
@@ -168,26 +216,23 @@ impl<'a> Cycle<'a> {
             if level.matrix.count() >= fine.count() {
                 break;
             }
-            cycle.smoothers.push(smoother.ok_or(not_positive.clone())?);
+            self.smoothers.push(smoother.ok_or(NOT_POSITIVE)?);
             spacing = [0, 1].map(|k| spacing[k] * f64::from(steps[k]));
-            cycle.levels.push(level);
+            self.levels.push(level);
         }
-        let coarsest = cycle.levels.last().map_or(matrix, |level| &level.matrix);
-        cycle.coarsest =
-            Some(Envelope::new(coarsest, scale, !matrix.outliers.places.is_empty()).ok_or(not_positive)?);
-        Ok(cycle)
+        let coarsest = Envelope::new(self.coarsest_matrix(), scale, !self.matrix.outliers.places.is_empty());
+        self.coarsest = Some(coarsest.ok_or(NOT_POSITIVE)?);
+        Ok(())
     }
 
-    fn is_coarse_enough(&self) -> bool {
-        let matrix = self.levels.last().map_or(self.matrix, |level| &level.matrix);
-        let is_slender = || matrix.columns.extent().iter().any(|&nodes| nodes <= ACROSS);
-        matrix.count() <= COARSEST || (!self.levels.is_empty() && is_slender())
+    fn coarsest_matrix(&self) -> &Matrix {
+        self.levels.last().map_or(self.matrix, |level| &*level.matrix)
     }
 
     /// `v` of the finest level becomes the cycle's answer to its `f`.
     fn run(&mut self) {
         let Self { matrix, vectors, smoothers, levels, coarsest } = self;
-        descend(matrix, vectors, (smoothers, levels), coarsest.as_mut().expect("set up"));
+        descend(matrix, vectors, (smoothers, levels), coarsest.as_mut());
     }
 }
 
@@ -195,13 +240,14 @@ fn descend(
     matrix: &Matrix,
     vectors: &mut LevelVectors,
     (smoothers, below): (&[Smoother], &mut [Level]),
-    coarsest: &mut Envelope,
+    coarsest: Option<&mut Envelope>,
 ) {
     let LevelVectors { f, u, v } = vectors;
     let (Some((Smoother { stencils, weights }, smoothers)), Some((next, further))) =
         (smoothers.split_first(), below.split_first_mut())
     else {
-        solve_coarsest(matrix, coarsest, f, v);
+        // Of levels that are left to the first rank the others have nothing.
+        coarsest.into_iter().for_each(|coarsest| solve_coarsest(matrix, coarsest, f, v));
         return;
     };
     steps::precondition(matrix, stencils, (0.0, weights[0]), f, u);
@@ -212,7 +258,7 @@ fn descend(
     if let Some(Transfers { team, down, .. }) = &next.transfers {
         down.receive(team, u);
     }
-    let levels = (matrix, &next.matrix);
+    let levels = (matrix, &*next.matrix);
     next.transfer.restrict(levels, &next.outliers, u, &mut next.vectors.f);
     descend(&next.matrix, &mut next.vectors, (smoothers, further), coarsest);
     if let Some(Transfers { team, up, .. }) = &next.transfers {
@@ -238,13 +284,25 @@ fn solve_coarsest(matrix: &Matrix, coarsest: &mut Envelope, f: &mut Vectors<f32>
 impl Level {
     fn new(fine: &Matrix, transfer: Transfer) -> Self {
         let (mut matrix, outliers) = coarsen::coarsen(fine, transfer);
-        let part = fine.part.as_ref().map(|part| Part::new(&part.team, &matrix));
+        // What one rank has alone it needs not share.
+        let part = fine.part.as_ref().filter(|_| fine.window.is_none());
+        let part = part.map(|part| Part::new(&part.team, &matrix));
         let with_part = fine.part.as_deref().zip(part.as_ref());
         let transfers = with_part
             .map(|(above, here)| Transfers::new([(above, fine), (here, &matrix)], transfer, &outliers));
         matrix.part = part.map(Arc::new);
         let vectors = LevelVectors::new(matrix.count());
-        Self { transfer, outliers, matrix, vectors, transfers }
+        Self { transfer, outliers, matrix: Arc::new(matrix), vectors, transfers }
+    }
+
+    /// The same of a level that is set up.
+    fn in_window(fine: &Matrix, coarse: &Arc<Matrix>, transfer: Transfer) -> Self {
+        let outliers = OutlierShares { first: usize::MAX, ..OutlierShares::default() };
+        let parts = fine.part.as_deref().zip(coarse.part.as_deref());
+        let transfers = parts
+            .map(|(above, here)| Transfers::new([(above, fine), (here, &**coarse)], transfer, &outliers));
+        let vectors = LevelVectors::new(coarse.count());
+        Self { transfer, outliers, matrix: coarse.clone(), vectors, transfers }
     }
 }
 

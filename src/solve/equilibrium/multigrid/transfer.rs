@@ -153,6 +153,18 @@ impl Transfer {
         });
     }
 
+    /// Columns of the fine grid that have a share in these of the coarse one.
+    pub fn columns_below(self, coarse: &Range<i32>) -> Range<i32> {
+        let across = self.steps[0];
+        coarse.start * across - across + 1..(coarse.end - 1) * across + across
+    }
+
+    /// Columns of the coarse grid that have a share in these of the fine one.
+    pub fn columns_above(self, fine: &Range<i32>) -> Range<i32> {
+        let across = self.steps[0];
+        fine.start.div_euclid(across)..(fine.end - 1).div_euclid(across) + 2
+    }
+
     /// What [`Transfer::restrict`] to these groups of nodes reads of the fine particles.
     pub fn restricted_from(
         self,
@@ -160,12 +172,11 @@ impl Transfer {
         outliers: &OutlierShares,
         groups: &Range<usize>,
     ) -> Vec<Range<usize>> {
-        let across = self.steps[0];
         let [first, end] = [groups.start, groups.end].map(|group| coarse.group_columns[group]);
-        let columns = first * across - across + 1..(end - 1) * across + across;
+        let columns = self.columns_below(&(first..end));
         let nodes = coarse.bounds[groups.start]..coarse.bounds[groups.end];
         let one = |i: usize| i..i + 1;
-        let of_columns = Some(fine.columns.particles(columns)).filter(|_| first < end);
+        let of_columns = Some(fine.particles_of(columns)).filter(|_| first < end);
         of_columns.into_iter().chain(outliers.restricted_from(&nodes).map(one)).collect()
     }
 
@@ -176,12 +187,11 @@ impl Transfer {
         outliers: &OutlierShares,
         groups: &Range<usize>,
     ) -> Vec<Range<usize>> {
-        let across = self.steps[0];
         let [first, end] = [groups.start, groups.end].map(|group| fine.group_columns[group]);
-        let columns = first.div_euclid(across)..(end - 1).div_euclid(across) + 2;
+        let columns = self.columns_above(&(first..end));
         let particles = fine.bounds[groups.start]..fine.bounds[groups.end];
         let one = |i: usize| i..i + 1;
-        let of_columns = Some(coarse.columns.particles(columns)).filter(|_| first < end);
+        let of_columns = Some(coarse.particles_of(columns)).filter(|_| first < end);
         of_columns.into_iter().chain(outliers.prolonged_from(&particles).map(one)).collect()
     }
 

@@ -1,0 +1,113 @@
+//! The equilibrium of a body of which each rank lays out a part has the bits of one that is laid out as a whole.
+
+use flockform::continuum::parts::laid_out_whole_for;
+use flockform::continuum::plan::Plan;
+
+use super::parts::{PLATE, assert_scene_parted_the_same, plate};
+use super::scenes::load;
+use super::{on_ranks, solved_on};
+
+/// A scene of the plate whose equilibrium a solver finds.
+fn assert_at_rest_the_same(solver: &str, sets: &[&str]) {
+    let asked = format!("equilibrium={{solver=\"{solver}\",tolerance=1e-7}}");
+    // A body that is put to rest has no history.
+    let sets = [&[&asked[..]], sets, &["record.probes=[]"]].concat();
+    assert_scene_parted_the_same(&plate(PLATE, &sets), &format!("{sets:?}"), 60);
+}
+
+#[test]
+fn the_equilibrium_of_a_body_in_parts_has_the_bits_of_one_laid_out_as_a_whole() {
+    let grid = "body={shape={kind=\"grid\",columns=24,rows=9}}";
+    let lattice = |kind: &str| format!("lattice={{kind=\"{kind}\",spacing=1.0}}");
+    let [hexagonal, honeycomb] = ["hexagonal", "honeycomb"].map(lattice);
+    let inclusion = "body.inclusions=[{shape={kind=\"disc\",centre=[14.0,6.0],radius=3.1},\
+         material={kind=\"isotropic\",young=9000.0,poisson=0.2}}]";
+    let several = "loads=[{kind=\"pressure\",region={kind=\"outline\",hole=1},pressure=9.0},\
+         {kind=\"traction\",region={kind=\"edge\",side=\"top\",depth=4.0},traction=[2.0,7.0],\
+         profile={from=[0.0,0.0],to=[20.0,1.0],factors=[0.5,1.5]}},\
+         {kind=\"force\",region={kind=\"disc\",centre=[17.0,6.0],radius=2.0},force=[0.5,-1.5]},\
+         {kind=\"body\",force=[0.1,-0.7]}]";
+    let places = "record={places=[[16.3,5.8],[2.1,5.5],[20.9,5.0],[12.0,6.0]]}";
+    let held = |side: &str, axis: &str| {
+        format!("{{region={{kind=\"edge\",side=\"{side}\",depth=1.5}},role=\"clamped\",axis=\"{axis}\"}}")
+    };
+    let led = "{region={kind=\"edge\",side=\"right\",depth=1.5},role=\"leader\",axis=\"x\",\
+         motion={kind=\"keyframes\",frames=[{step=20,displacement=[0.8,0.0]}]}}";
+    let rollers = format!("roles=[{},{}]", held("left", "x"), held("bottom", "y"));
+    let pulled = format!("roles=[{},{},{led}]", held("left", "x"), held("bottom", "y"));
+    let whole_cells = "body={outline=\"fitted\",shape={kind=\"rectangle\",max=[22,9]}}";
+    for sets in [
+        &[][..],
+        &[several, places],
+        &[grid],
+        &[&hexagonal, several],
+        &[&honeycomb],
+        &[&honeycomb, grid],
+        &["lattice={kind=\"rectangular\",a=1.0,b=0.7}"],
+        &["lattice={kind=\"centred-rectangular\",a=1.5,b=1.1}", several],
+        &["lattice={kind=\"oblique\",a=1.0,b=0.9,angle=70.0}"],
+        &[inclusion, several],
+        &["material.poisson=0.49", several],
+        &[&rollers, several],
+        &[&pulled, places],
+        &[grid, &pulled],
+        &[whole_cells, places],
+    ] {
+        assert_at_rest_the_same("multigrid", sets);
+        assert_at_rest_the_same("auto", sets);
+    }
+    for solver in ["conjugate-gradients", "direct", "jacobi", "gauss-seidel", "chebyshev"] {
+        assert_at_rest_the_same(solver, &[several, &pulled]);
+    }
+}
+
+/// Rules of the paper are linear too, with their frames.
+#[test]
+fn rules_of_the_paper_too() {
+    let paper = ["rule.mean.kind=\"barycentre\"", "neighbours={kind=\"second\"}"];
+    let grid = "body={shape={kind=\"grid\",columns=24,rows=9}}";
+    for more in [&[][..], &[grid], &["frame=\"lagged\""], &[grid, "frame=\"immediate\""]] {
+        assert_at_rest_the_same("auto", &[&paper[..], more].concat());
+    }
+    assert_at_rest_the_same("multigrid", &paper);
+}
+
+/// Large enough for several ranks to share two levels and more.
+#[test]
+fn a_large_equilibrium_too() {
+    assert_at_rest_the_same("multigrid", &["lattice={kind=\"square\",spacing=0.05}"]);
+}
+
+#[test]
+fn what_has_no_equilibrium_is_refused_by_all_ranks_with_the_same_words() {
+    let asked = "equilibrium={solver=\"multigrid\",tolerance=1e-7}";
+    for (what, sets) in [
+        ("no particle follows", &["roles=[{region={kind=\"all\"},role=\"clamped\"}]"][..]),
+        ("connected to no held particle", &["roles=[]"]),
+        ("not linear", &["rule.mean={kind=\"power\",exponent=2.0}", "neighbours={kind=\"second\"}"]),
+    ] {
+        let scene = plate(PLATE, &[&[asked, "record.probes=[]"], sets].concat());
+        let words = |ranks: usize| {
+            on_ranks(ranks, |team| {
+                let plan = Plan::of_part(&scene, &team).unwrap_or_else(|error| panic!("{error}"));
+                solved_on(&scene, &plan, &team).expect_err("no equilibrium").to_string()
+            })
+        };
+        let alone = words(1).remove(0);
+        assert!(alone.contains(what), "{what}: {alone}");
+        for ranks in [2, 3, 5] {
+            assert!(words(ranks).iter().all(|one| *one == alone), "{ranks} ranks: {alone}");
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_solved_in_parts_is_laid_out_whole_by_name() {
+    let whole_for = |name: &str, sets: &[&str]| laid_out_whole_for(&load(name, sets));
+    assert_eq!(whole_for("beam-loaded", &[]), None);
+    assert_eq!(whole_for("elastica", &[]).as_deref(), Some("equilibrium"));
+    assert_eq!(whole_for("ring", &[]).as_deref(), Some("equilibrium"));
+    assert_eq!(whole_for("beam-loaded", &["load_steps={increments=3}"]).as_deref(), Some("load_steps"));
+    let accurate = "equilibrium={accuracy=0.05}";
+    assert_eq!(whole_for("beam-loaded", &[accurate]).as_deref(), Some("equilibrium"));
+}
