@@ -213,6 +213,7 @@ fn threads_share_a_body_in_the_schedule_and_where_a_solver_or_a_report_goes_over
         "engine/movement.rs",
         "solve/corotated.rs",
         "solve/equilibrium/steps.rs",
+        "solve/equilibrium/windows/tests.rs",
         "sweep/mod.rs",
         "sweep/schedule.rs",
         "sweep/schedule/tests.rs",
