@@ -175,10 +175,7 @@ impl Engine {
 
     /// The numbers of those particles of other parts that the particles of this one see, which the others know; none of a whole
     /// body.
-    pub(crate) fn of_others<const N: usize>(
-        &self,
-        own: impl Fn(usize) -> [f64; N],
-    ) -> HashMap<usize, [f64; N]> {
+    pub fn of_others<const N: usize>(&self, own: impl Fn(usize) -> [f64; N]) -> HashMap<usize, [f64; N]> {
         let (Some(team), Some(domain)) = (self.parted(), self.sweep.domain()) else { return HashMap::new() };
         let halo = domain.halo(0);
         let words = |(rank, of): &(usize, Range<usize>)| {
