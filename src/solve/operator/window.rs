@@ -2,7 +2,7 @@
 //!
 //! All ranks know how many particles each column of the whole has and what they cost, and so how the columns are cut into
 //! groups. Columns that another rank has computed travel as numbers, with the rows that their particles have. A row has a
-//! *name*, which hangs on nothing but what it was computed from: rows of one name are one, whoever computed them.
+//! *name*, which hangs on nothing but what it was computed from: rows of one name are one, on whichever rank they were computed.
 
 use std::collections::HashMap;
 use std::ops::Range;
