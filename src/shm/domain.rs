@@ -62,13 +62,16 @@ impl Domain {
         set_log_level_from_env_or(LogLevel::Fatal);
         let refused = |reason: String| ShmError::Node { reason };
         let name = NodeName::new(name).map_err(|error| refused(error.to_string()))?;
-        let folders = Folders::open(&self.config);
+        let folders = Folders::of(&self.config);
+        folders.open();
         let node = NodeBuilder::new()
             .name(&name)
             .config(&self.config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .map_err(|error| refused(error.to_string()))?;
+        // The last of other peers may have removed them meanwhile, and iceoryx2 have made them this user's alone.
+        folders.open();
         Ok(Peer { node, config: self.config.clone(), _folders: folders })
     }
 }

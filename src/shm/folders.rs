@@ -11,7 +11,7 @@ use iceoryx2::prelude::Config;
 /// Removes them when it is dropped, which must be after all that has files in them.
 #[derive(Debug)]
 pub(super) struct Folders {
-    /// The root, and what is in it.
+    /// The root, and in it that of services and that of nodes.
     folders: [PathBuf; 3],
     /// Of all files of the domain, and of the one in which it counts its nodes.
     prefix: String,
@@ -22,34 +22,35 @@ pub(super) struct Folders {
 const SHARED_MEMORY: &str = "/dev/shm";
 
 impl Folders {
-    pub fn open(config: &Config) -> Self {
+    pub fn of(config: &Config) -> Self {
         let global = &config.global;
         let folders =
             [*global.root_path(), global.service_dir(), global.node_dir()].map(|path| as_path(&path));
-        for folder in &folders {
-            // Where this fails, joining fails and says why.
-            if fs::create_dir(folder).is_ok() {
-                let _ = open_to_all(folder);
-            }
-        }
         let (prefix, counter) = (global.prefix.to_string(), global.node.global_mgmt_suffix.to_string());
         Self { folders, prefix, counter }
+    }
+
+    /// Makes those that are missing, and opens this user's to all.
+    pub fn open(&self) {
+        for folder in &self.folders {
+            // Where this fails, joining fails and says why; only their owner can open them.
+            let _ = fs::create_dir(folder);
+            let _ = open_to_all(folder);
+        }
     }
 }
 
 impl Drop for Folders {
     fn drop(&mut self) {
         let is_of_domain = |name: &String| name.starts_with(&self.prefix);
-        let [root, services, nodes] = &self.folders;
+        let [_, _, nodes] = &self.folders;
         if !names(nodes).iter().any(is_of_domain) {
             // Numbers of nodes begin anew when there is no node.
             let counters = names(Path::new(SHARED_MEMORY)).into_iter().filter(|name| self.is_counter(name));
             counters.for_each(|name| drop(fs::remove_file(Path::new(SHARED_MEMORY).join(name))));
         }
-        // One with files in it is in use.
-        for folder in [services, nodes, root] {
-            let _ = fs::remove_dir(folder);
-        }
+        // One with files in it is in use. Of one who has joined there is a node before there is a service.
+        let _ = self.folders.iter().rev().try_for_each(fs::remove_dir);
     }
 }
 
@@ -98,4 +99,37 @@ fn open_to_all(folder: &Path) -> std::io::Result<()> {
 #[cfg(not(unix))]
 fn open_to_all(_folder: &Path) -> std::io::Result<()> {
     Ok(())
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::os::unix::fs::PermissionsExt;
+
+    use iceoryx2::prelude::SemanticString;
+
+    use super::*;
+
+    #[test]
+    fn folders_made_for_one_user_are_opened_and_outlast_a_peer_while_another_is_there() {
+        let parent = tempfile::tempdir().expect("a folder");
+        let mut config = Config::global_config().clone();
+        let root = parent.path().join("root");
+        let name = iceoryx2::prelude::Path::new(root.to_string_lossy().as_bytes()).expect("a path");
+        config.global.set_root_path(&name);
+        let (first, second) = (Folders::of(&config), Folders::of(&config));
+        first.open();
+        let services = as_path(&config.global.service_dir());
+        // As iceoryx2 makes it.
+        fs::set_permissions(&services, fs::Permissions::from_mode(0o750)).expect("ours");
+        second.open();
+        let mode = services.metadata().expect("it is there").permissions().mode();
+        assert_eq!(mode & 0o7777, 0o1777);
+        let node = as_path(&config.global.node_dir()).join("node");
+        fs::write(&node, "").expect("a node");
+        drop(first);
+        assert!(services.is_dir(), "another peer is there");
+        fs::remove_file(node).expect("it was there");
+        drop(second);
+        assert!(!root.exists());
+    }
 }
