@@ -68,9 +68,14 @@ impl SystemPart {
 
     /// Indices in the whole of the particles of each rank that are so and so many here.
     pub fn of_each(&self, here: Range<usize>) -> Vec<Range<usize>> {
-        let ends = [here.start + self.first, here.end + self.first].map(|end| end as u64);
-        self.team.each(ends).into_iter().map(|[start, end]| start as usize..end as usize).collect()
+        of_each(&self.team, here.start + self.first..here.end + self.first)
     }
+}
+
+/// The range that each rank gives.
+pub fn of_each(team: &Team, own: Range<usize>) -> Vec<Range<usize>> {
+    let all = team.each([own.start as u64, own.end as u64]);
+    all.into_iter().map(|[start, end]| start as usize..end as usize).collect()
 }
 
 /// Has words of particles travel from the ranks that own them to those that want them: `read` the words of some of those here,

@@ -6,7 +6,7 @@ use crate::flock::block::{apply, inverse};
 use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
 use crate::solve::operator::{HELD, Matrix, Operator, RowCoefficients, power_of_two};
-use crate::solve::shared::{SystemPart, moved};
+use crate::solve::shared::{SystemPart, moved, of_each};
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
@@ -231,20 +231,15 @@ impl Prepared {
         let of_whole = |team: &Team| SystemPart::of_whole(team, &self.matrix.columns);
         let of_whole = self.team.as_ref().filter(|_| is_shared).map(of_whole);
         let Some(part) = system.part.clone().or(of_whole) else { return };
-        let count = self.matrix.count();
         let matrix = std::mem::replace(&mut self.matrix, Matrix::nothing());
         (self.matrix, self.coarser) = match is_shared {
             true => windows::of_part(&part, matrix, (solver == Solver::Multigrid, self.grid)),
             false => (windows::whole_of_part(&part, matrix), Vec::new()),
         };
         let first = self.matrix.first();
-        let wanted = first..first + self.matrix.count();
-        let wanted = part.team.each([wanted.start as u64, wanted.end as u64]);
-        let wanted: Vec<_> = wanted.into_iter().map(|[start, end]| start as usize..end as usize).collect();
+        let wanted = of_each(&part.team, first..first + self.matrix.count());
         let owned = part.of_each(part.owned.clone());
-        let right = std::mem::take(&mut self.right);
-        debug_assert_eq!(right.len(), count);
-        self.right = moved(&part.team, (&owned, &wanted), (&right, part.first));
+        self.right = moved(&part.team, (&owned, &wanted), (&self.right, part.first));
         self.kept_right = Some(self.right.clone());
         self.team = Some(part.team);
     }
@@ -259,9 +254,7 @@ impl Prepared {
         };
         let cuts = &self.matrix.part.as_ref().expect("a window is a part").cuts;
         let owned: Vec<_> = (0..team.count()).map(|rank| cuts.particles_of(rank)).collect();
-        let wanted = team.each([here.start as u64, here.end as u64]);
-        let wanted: Vec<_> = wanted.into_iter().map(|[start, end]| start as usize..end as usize).collect();
-        moved(team, (&owned, &wanted), (&found, window.first))
+        moved(team, (&owned, &of_each(team, here)), (&found, window.first))
     }
 
     /// The rows as the passes of an iteration read them.

@@ -7,9 +7,9 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::multigrid::coarsen::{self, coarsen_columns, first_steps, next_steps};
+use super::multigrid::coarsen::{self, coarsen_columns};
+use super::multigrid::descent::Descent;
 use super::multigrid::transfer::Transfer;
-use super::multigrid::{is_coarse_enough, spacing_of};
 use crate::ranks::Team;
 use crate::solve::operator::{Census, Matrix, fetched};
 use crate::solve::part::{Cuts, Part};
@@ -115,22 +115,23 @@ pub(super) fn of_part(
 ) -> (Matrix, Vec<(Transfer, Arc<Matrix>)>) {
     let team = &part.team;
     let (shares, step) = part.columns(&matrix.columns);
-    let mut spacing = spacing_of(grid);
+    let mut descent = Descent::new(grid);
     let mut levels = vec![Level::new(team, matrix, shares, step)];
     let mut ways: Vec<Transfer> = Vec::new();
     loop {
         let level = &levels[ways.len()];
         let census = &level.census;
-        let steps = match ways.is_empty() {
-            true => first_steps(grid, census.particles_per_site()),
-            false => next_steps(spacing),
-        };
-        let is_over = is_coarse_enough((census.count(), census.extent()), ways.is_empty());
-        let goes_on = coarsened && level.cuts.is_shared() && !is_over;
-        let next = goes_on.then(|| level.coarser(team, Transfer { steps }));
-        let Some(next) = next.filter(|next| next.census.count() < census.count()) else { break };
-        spacing = [0, 1].map(|k| spacing[k] * f64::from(steps[k]));
-        ways.push(Transfer { steps });
+        if !coarsened || !level.cuts.is_shared() {
+            break;
+        }
+        let way = descent.next((census.count(), census.extent()), || census.particles_per_site());
+        let Some(way) = way else { break };
+        let next = level.coarser(team, way);
+        if next.census.count() >= census.count() {
+            break;
+        }
+        descent.go(way);
+        ways.push(way);
         levels.push(next);
     }
     if coarsened {

@@ -14,41 +14,6 @@ use crate::flock::lattice::Site;
 use crate::solve::equilibrium::steps::in_pieces;
 use crate::solve::operator::{Columns, HELD, Matrix, Outliers, RowRef, Rows, leads_to_outlier, name_of};
 
-/// How much coarser the first grid is than the lattice, in particles per node.
-const FIRST_RATIO: f64 = 4.0;
-
-/// Most columns, and rows, to a node.
-const MOST_STEPS: usize = 8;
-
-/// Columns and rows to a node of the first coarse grid: about four particles each, the nodes about as far
-/// apart both ways. `grid` are the vectors of one column and one row \[length\].
-pub fn first_steps(grid: [[f64; 2]; 2], particles_per_site: f64) -> [i32; 2] {
-    let length = |v: [f64; 2]| v[0].hypot(v[1]);
-    let spacing = grid.map(length);
-    let cost = |[i, j]: [i32; 2]| {
-        let ratio = f64::from(i * j) * particles_per_site / FIRST_RATIO;
-        let aspect = f64::from(i) * spacing[0] / (f64::from(j) * spacing[1]);
-        // A grid that is too coarse costs iterations, one that is too fine costs memory.
-        ratio.ln().abs() + 1.5 * aspect.ln().abs()
-    };
-    let most = MOST_STEPS as i32;
-    let all = (1..=most).flat_map(|i| (1..=most).map(move |j| [i, j])).filter(|&[i, j]| i * j > 1);
-    all.min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or([2, 2])
-}
-
-/// Columns and rows to a node of the next coarser grid: two each way, but only along the denser direction
-/// where nodes lie farther apart along the other. `spacing` is that of the present nodes \[length\].
-pub fn next_steps(spacing: [f64; 2]) -> [i32; 2] {
-    let aspect = spacing[0] / spacing[1];
-    if aspect > 1.6 {
-        [1, 2]
-    } else if aspect < 1.0 / 1.6 {
-        [2, 1]
-    } else {
-        [2, 2]
-    }
-}
-
 /// Fewest rows of a coarse grid that a thread sums: what two threads share of their surroundings each computes for itself.
 const PIECE: usize = 64;
 

@@ -18,6 +18,7 @@
 //! rounding does to it costs no digit of the equilibrium; the iteration around it runs in double precision.
 
 pub(super) mod coarsen;
+pub(super) mod descent;
 mod envelope;
 mod sums;
 #[cfg(test)]
@@ -26,6 +27,7 @@ pub(super) mod transfer;
 
 use std::sync::Arc;
 
+use self::descent::Descent;
 use self::envelope::Envelope;
 use self::transfer::{OutlierShares, Transfer};
 use super::conjugate_gradients::{Preconditioner, iterate, iterate_single, single_scale};
@@ -38,13 +40,6 @@ use crate::solve::field::{Real, dot};
 use crate::solve::operator::{Matrix, RowCoefficients};
 use crate::solve::part::{Halo, Part};
 use crate::solve::stopwatch::Stopwatch;
-
-/// Nodes of the coarsest level: fewer are not worth another level.
-const COARSEST: usize = 640;
-
-/// Nodes across a slender body below which it is not coarsened further: fewer could not bend. Along it
-/// the factor only grows with its length.
-const ACROSS: i32 = 5;
 
 /// Lanczos steps for the largest eigenvalue of each level, and what its estimate is raised by.
 const ESTIMATE: usize = 12;
@@ -155,17 +150,6 @@ impl Smoother {
 
 const NOT_POSITIVE: SolveError = SolveError::NotPositive { solver: Solver::Multigrid, iteration: 0 };
 
-/// Columns and rows \[length\].
-pub(super) fn spacing_of(grid: [[f64; 2]; 2]) -> [f64; 2] {
-    grid.map(|v| v[0].hypot(v[1]))
-}
-
-/// Whether a level of so many nodes, in as many columns and rows, is to be solved outright.
-pub(super) fn is_coarse_enough((count, extent): (usize, [i32; 2]), is_finest: bool) -> bool {
-    let is_slender = extent.iter().any(|&nodes| nodes <= ACROSS);
-    count <= COARSEST || (!is_finest && is_slender)
-}
-
 impl<'a> Cycle<'a> {
     fn of_finest(matrix: &'a Matrix) -> Self {
         let vectors = LevelVectors::new(matrix.count());
@@ -174,50 +158,45 @@ impl<'a> Cycle<'a> {
 
     fn new(matrix: &'a Matrix, grid: [[f64; 2]; 2]) -> Result<Self, SolveError> {
         let mut cycle = Self::of_finest(matrix);
-        cycle.go_down(single_scale(matrix), grid, spacing_of(grid))?;
+        cycle.go_down(single_scale(matrix), Descent::new(grid))?;
         Ok(cycle)
     }
 
     /// The same where each rank has windows of the levels that they share; the first one goes on alone.
     fn in_windows(prepared: &'a Prepared) -> Result<Self, SolveError> {
-        let (matrix, grid) = (&prepared.matrix, prepared.grid);
+        let matrix = &prepared.matrix;
         let mut cycle = Self::of_finest(matrix);
-        let (scale, mut spacing) = (single_scale(matrix), spacing_of(grid));
+        let (scale, mut descent) = (single_scale(matrix), Descent::new(prepared.grid));
         let mut of_levels = || {
             for (transfer, coarse) in &prepared.coarser {
                 let fine = cycle.coarsest_matrix();
                 let smoother = Smoother::new(fine, scale).ok_or(NOT_POSITIVE)?;
                 let level = Level::in_window(fine, coarse, *transfer);
                 cycle.smoothers.push(smoother);
-                spacing = [0, 1].map(|k| spacing[k] * f64::from(transfer.steps[k]));
+                descent.go(*transfer);
                 cycle.levels.push(level);
             }
             let is_left_to_this = !cycle.coarsest_matrix().own_groups().is_empty();
-            if is_left_to_this { cycle.go_down(scale, grid, spacing) } else { Ok(()) }
+            if is_left_to_this { cycle.go_down(scale, descent) } else { Ok(()) }
         };
         let is_over = of_levels().is_err();
         let any = prepared.team.as_ref().is_some_and(|team| team.any(is_over));
         if any { Err(NOT_POSITIVE) } else { Ok(cycle) }
     }
 
-    /// Adds the levels from here on, each of which this rank has whole; nodes are `spacing` apart.
-    fn go_down(&mut self, scale: f64, grid: [[f64; 2]; 2], mut spacing: [f64; 2]) -> Result<(), SolveError> {
+    /// Adds the levels from here on, each of which this rank has whole.
+    fn go_down(&mut self, scale: f64, mut descent: Descent) -> Result<(), SolveError> {
         loop {
             let fine = self.coarsest_matrix();
-            if is_coarse_enough((fine.count(), fine.columns.extent()), self.levels.is_empty()) {
-                break;
-            }
-            let steps = match self.levels.len() {
-                0 => coarsen::first_steps(grid, particles_per_site(fine)),
-                _ => coarsen::next_steps(spacing),
-            };
+            let next = descent.next((fine.count(), fine.columns.extent()), || particles_per_site(fine));
+            let Some(transfer) = next else { break };
             let (level, smoother) =
-                side_by_side(|| Level::new(fine, Transfer { steps }), || Smoother::new(fine, scale));
+                side_by_side(|| Level::new(fine, transfer), || Smoother::new(fine, scale));
             if level.matrix.count() >= fine.count() {
                 break;
             }
             self.smoothers.push(smoother.ok_or(NOT_POSITIVE)?);
-            spacing = [0, 1].map(|k| spacing[k] * f64::from(steps[k]));
+            descent.go(transfer);
             self.levels.push(level);
         }
         let coarsest = Envelope::new(self.coarsest_matrix(), scale, !self.matrix.outliers.places.is_empty());
@@ -286,23 +265,22 @@ impl Level {
         let (mut matrix, outliers) = coarsen::coarsen(fine, transfer);
         // What one rank has alone it needs not share.
         let part = fine.part.as_ref().filter(|_| fine.window.is_none());
-        let part = part.map(|part| Part::new(&part.team, &matrix));
-        let with_part = fine.part.as_deref().zip(part.as_ref());
-        let transfers = with_part
-            .map(|(above, here)| Transfers::new([(above, fine), (here, &matrix)], transfer, &outliers));
-        matrix.part = part.map(Arc::new);
-        let vectors = LevelVectors::new(matrix.count());
-        Self { transfer, outliers, matrix: Arc::new(matrix), vectors, transfers }
+        matrix.part = part.map(|part| Arc::new(Part::new(&part.team, &matrix)));
+        Self::below(fine, Arc::new(matrix), transfer, outliers)
     }
 
     /// The same of a level that is set up.
     fn in_window(fine: &Matrix, coarse: &Arc<Matrix>, transfer: Transfer) -> Self {
         let outliers = OutlierShares { first: usize::MAX, ..OutlierShares::default() };
-        let parts = fine.part.as_deref().zip(coarse.part.as_deref());
-        let transfers = parts
-            .map(|(above, here)| Transfers::new([(above, fine), (here, &**coarse)], transfer, &outliers));
-        let vectors = LevelVectors::new(coarse.count());
-        Self { transfer, outliers, matrix: coarse.clone(), vectors, transfers }
+        Self::below(fine, coarse.clone(), transfer, outliers)
+    }
+
+    fn below(fine: &Matrix, matrix: Arc<Matrix>, transfer: Transfer, outliers: OutlierShares) -> Self {
+        let parts = fine.part.as_deref().zip(matrix.part.as_deref());
+        let transfers =
+            parts.map(|(above, here)| Transfers::new([(above, fine), (here, &*matrix)], transfer, &outliers));
+        let vectors = LevelVectors::new(matrix.count());
+        Self { transfer, outliers, matrix, vectors, transfers }
     }
 }
 

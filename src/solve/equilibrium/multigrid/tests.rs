@@ -1,6 +1,7 @@
 //! The parts of the cycle, on every lattice.
 
-use super::coarsen::{coarsen, first_steps, next_steps};
+use super::coarsen::coarsen;
+use super::descent::{first_steps, next_steps, spacing_of};
 use super::envelope::Envelope;
 use super::transfer::{OutlierShares, Transfer};
 use super::*;
@@ -44,8 +45,8 @@ fn each_coarsening(test: impl Fn(LatticeKind, &Matrix, &(Matrix, OutlierShares),
         let operators = [with_outliers(&regular), regular];
         for fine in operators.iter().map(Matrix::of_followers) {
             let lattice = Lattice::new(kind, [0.0; 2], 0.2);
-            let first =
-                first_steps([lattice.vector([1, 0]), lattice.vector([0, 1])], particles_per_site(&fine));
+            let spacing = spacing_of([lattice.vector([1, 0]), lattice.vector([0, 1])]);
+            let first = first_steps(spacing, particles_per_site(&fine));
             for steps in [first, [2, 2], [1, 2], [2, 1], [3, 4]] {
                 let transfer = Transfer { steps };
                 let coarse = coarsen(&fine, transfer);
@@ -202,10 +203,10 @@ fn nodes_lie_about_as_far_apart_both_ways_and_stand_for_about_four_particles() {
     ]);
     for kind in lattices {
         let lattice = Lattice::new(kind, [0.0; 2], 0.0);
-        let grid = [lattice.vector([1, 0]), lattice.vector([0, 1])];
+        let mut spacing = spacing_of([lattice.vector([1, 0]), lattice.vector([0, 1])]);
         let fine = Matrix::of_followers(&operator(kind, 24, 24, |i| i == 0));
-        let steps = first_steps(grid, particles_per_site(&fine));
-        let mut spacing = [0, 1].map(|k| grid[k][0].hypot(grid[k][1]) * f64::from(steps[k]));
+        let steps = first_steps(spacing, particles_per_site(&fine));
+        spacing = [0, 1].map(|k| spacing[k] * f64::from(steps[k]));
         let ratio = fine.count() as f64 / coarsen(&fine, Transfer { steps }).0.count() as f64;
         println!("{kind:?} {steps:?} {spacing:?} {ratio}");
         assert!((1.9..5.0).contains(&ratio), "{kind:?} {steps:?}: {ratio}");
