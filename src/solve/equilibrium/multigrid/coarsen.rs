@@ -6,6 +6,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
+use super::descent::MOST_STEPS;
 use super::sums::Sums;
 use super::transfer::{OutlierShares, Transfer, parents_of_place};
 use crate::flock::block::Block;

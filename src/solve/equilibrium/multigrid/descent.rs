@@ -6,7 +6,7 @@ use super::transfer::Transfer;
 const FIRST_RATIO: f64 = 4.0;
 
 /// Most columns, and rows, to a node.
-const MOST_STEPS: i32 = 8;
+pub const MOST_STEPS: usize = 8;
 
 /// Nodes of the coarsest level: fewer are not worth another level.
 const COARSEST: usize = 640;
@@ -67,7 +67,8 @@ pub fn first_steps(spacing: [f64; 2], particles_per_site: f64) -> [i32; 2] {
         // A grid that is too coarse costs iterations, one that is too fine costs memory.
         ratio.ln().abs() + 1.5 * aspect.ln().abs()
     };
-    let all = (1..=MOST_STEPS).flat_map(|i| (1..=MOST_STEPS).map(move |j| [i, j]));
+    let most = MOST_STEPS as i32;
+    let all = (1..=most).flat_map(|i| (1..=most).map(move |j| [i, j]));
     let coarser = all.filter(|&[i, j]| i * j > 1);
     coarser.min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or([2, 2])
 }

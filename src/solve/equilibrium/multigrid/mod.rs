@@ -167,7 +167,7 @@ impl<'a> Cycle<'a> {
         let matrix = &prepared.matrix;
         let mut cycle = Self::of_finest(matrix);
         let (scale, mut descent) = (single_scale(matrix), Descent::new(prepared.grid));
-        let mut of_levels = || {
+        let of_levels = || {
             for (transfer, coarse) in &prepared.coarser {
                 let fine = cycle.coarsest_matrix();
                 let smoother = Smoother::new(fine, scale).ok_or(NOT_POSITIVE)?;
