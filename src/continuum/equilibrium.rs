@@ -215,10 +215,6 @@ fn of_plan_after(scene: &Scene, plan: &Plan, steps: f64) -> Result<System, Scene
             NotLinear::Broken => ("roles", "leave [equilibrium] out to step with broken bonds"),
             NotLinear::Operator(_) => ("rule", "give weights that are finite"),
         };
-        let error = match error {
-            NotLinear::Operator(error) => NotLinear::Operator(error.in_whole(plan.setup.body.first())),
-            error => error,
-        };
         scene.refuse(key, format!("no equilibrium can be solved for: {error}"), help)
     })?;
     system.is_nearly_incompressible = is_nearly_incompressible(scene);

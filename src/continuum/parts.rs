@@ -61,15 +61,12 @@ fn is_laid_out_otherwise(scene: &Scene, changed: &Scene) -> bool {
         || laid_out_whole_for(changed).is_some()
 }
 
-/// Whether the equilibrium that a scene asks for can be found where no rank has the whole: as a linear system, of particles that
-/// all stand at sites of the lattice.
+/// Whether the equilibrium that a scene asks for can be found where no rank has the whole: as a linear system.
 fn is_solved_in_parts(scene: &Scene) -> bool {
     let is_linear = !matches!(scene.mean, Mean::Material { rotation: Rotation::Corotated });
     let is_chosen = scene.equilibrium.is_some_and(|asked| asked.accuracy.is_some());
-    // A shape that cannot be laid out is refused later.
-    let is_cut = || source(scene).is_ok_and(|(fitted, _)| fitted.is_some_and(|fitted| !fitted.is_whole));
     let is_listed = !matches!(scene.weights, Some(Weights::Solved | Weights::Gradient { .. }));
-    is_linear && is_listed && !is_chosen && !(scene.is_fitted && is_cut())
+    is_linear && is_listed && !is_chosen
 }
 
 /// Which columns of a body are whose.

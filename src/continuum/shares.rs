@@ -11,6 +11,7 @@ use crate::flock::part::Part;
 use crate::scene::{Scene, SceneError};
 use crate::solve::corotated::is_corotated;
 use crate::solve::equilibrium::{Request, SolverShares, choose, shared_by};
+use crate::solve::order::outliers_of;
 use crate::sweep::Sweep;
 use crate::sweep::domain::{Domain, Share};
 
@@ -56,8 +57,6 @@ pub struct Shares {
     pub exchanged: Exchanged,
     /// Bytes that each rank takes for the body and what steps or solves it; the first one takes more for the results.
     pub bytes: usize,
-    /// Whether each rank sets up the whole system of which it shares the iterations.
-    pub is_set_up_whole: bool,
 }
 
 /// The parts of a body of which each rank lays out one.
@@ -136,7 +135,8 @@ impl PartShares {
 
 /// Particles of others in the columns that those of a part see.
 fn around(Setup { body, flock, .. }: &Setup) -> usize {
-    let (owned, column) = (body.owned(), |i: usize| body.sites[i][0]);
+    let outliers = outliers_of(body);
+    let (owned, column) = (body.owned(), |i: usize| outliers.column(body.sites[i]));
     let seen = |i: usize| flock.neighbours.of(i).iter().map(move |&k| column(k as usize));
     let columns = owned.clone().flat_map(seen);
     let ends = columns.fold([i32::MAX, i32::MIN], |[low, high], column| [low.min(column), high.max(column)]);
@@ -166,24 +166,23 @@ impl Shares {
             let largest = sweep.halo_sizes(steps).into_iter().max().unwrap_or_default();
             Exchanged::Halos { steps, bytes: PLACE * largest }
         };
-        Ok(Self { particles, exchanged, bytes: bytes_each(scene, plan), is_set_up_whole: false })
+        Ok(Self { particles, exchanged, bytes: bytes_each(scene, plan) })
     }
 
     fn of_solver(scene: &Scene, request: &Request, plan: &Plan, ranks: usize) -> Result<Self, SceneError> {
         let bytes = bytes_each(scene, plan);
         let (particles, exchanged) = (vec![plan.count(); ranks], Exchanged::Interrupts);
-        let all = Self { particles, exchanged, bytes, is_set_up_whole: true };
+        let all = Self { particles, exchanged, bytes };
         if is_corotated(&plan.setup.flock) {
             return Ok(all);
         }
         let system = of_plan(scene, plan)?;
         let (solver, _) = choose(&system, request);
         let shares = shared_by(&system, solver, ranks);
-        Ok(shares.map_or(all, |SolverShares { particles, received, is_set_up_whole }| Self {
+        Ok(shares.map_or(all, |SolverShares { particles, received }| Self {
             particles,
             exchanged: Exchanged::Iterations { bytes: PLACE * received },
             bytes,
-            is_set_up_whole,
         }))
     }
 
@@ -196,8 +195,7 @@ impl Shares {
         let idle = if idle == 0 { String::new() } else { format!("; {idle} have nothing to do") };
         let moved = match self.exchanged {
             Exchanged::Iterations { .. } => {
-                let set_up = if self.is_set_up_whole { "; each sets all up" } else { "" };
-                format!("{ranks}, which iterate on {least} to {most} particles each{idle}{set_up}")
+                format!("{ranks}, which iterate on {least} to {most} particles each{idle}")
             }
             Exchanged::Interrupts => {
                 format!("{ranks}, each of which solves for all {most}: no faster than one")

@@ -16,11 +16,10 @@ use std::time::Duration;
 
 use rayon::prelude::*;
 
-use super::equilibrium::{
-    Choice, Precision, Request, SolveError, Solved, Solver, System, solve as solve_linear,
-};
-use super::linear::{NotLinear, outlier_places};
+use super::equilibrium::{Choice, Precision, Request, SolveError, Solved, Solver, solve as solve_linear};
+use super::linear::NotLinear;
 use super::operator::{Operator, OperatorError, Row};
+use super::order::Order;
 use super::stopwatch::Stopwatch;
 use crate::flock::block::{Block, apply, plus};
 use crate::flock::body::Body;
@@ -152,7 +151,8 @@ pub fn solve(
     let followers = follows.iter().filter(|&&follows| follows).count();
     let (solver, why) = choose(followers, request)?;
     let step = Request { solver: Choice::This(solver), tolerance: OF_A_STEP, ..*request };
-    let rule = Corotated { flock, weights, body, follows, held_axes, way, step };
+    let order = Order::new(body);
+    let rule = Corotated { flock, weights, body, order, follows, held_axes, way, step };
     let mut newton = Newton {
         rule: &rule,
         size: rule.size(),
@@ -183,6 +183,7 @@ struct Corotated<'a> {
     flock: &'a Flock,
     weights: &'a MatrixWeights,
     body: &'a Body,
+    order: Order<'a>,
     follows: Vec<bool>,
     held_axes: Vec<[bool; 2]>,
     way: &'a Way<'a>,
@@ -311,7 +312,7 @@ impl Corotated<'_> {
         norm(&all)
     }
 
-    /// Second derivatives of the energy: forces per displacement.
+    /// Second derivatives of the energy, forces per displacement, in the order of a system.
     fn tangent(&self, locals: &[Option<Local>]) -> Result<Operator, OperatorError> {
         let lattice = &self.body.lattice;
         let grid = [lattice.vector([1, 0]), lattice.vector([0, 1])];
@@ -327,8 +328,12 @@ impl Corotated<'_> {
             }
             row
         };
-        let operator = Operator::from_rows(&self.body.sites, grid, self.follows.clone(), row)?;
-        Ok(operator.with_held_axes(self.held_axes.clone()).with_outliers(outlier_places(self.body)))
+        let (order, follows) = (&self.order, self.order.by_place(self.follows.clone()));
+        let (sites, outliers) = order.sites();
+        let row = |place: usize| row(order.particle(place));
+        let operator = Operator::from_rows_along_outline((&sites, outliers), grid, follows, row);
+        let operator = operator.map_err(|error| order.error(error))?;
+        Ok(operator.with_held_axes(order.by_place(self.held_axes.clone())))
     }
 }
 
@@ -432,7 +437,7 @@ impl Newton<'_> {
     ) -> Result<(), CorotatedError> {
         let begin = Stopwatch::start();
         let operator = self.rule.tangent(locals).map_err(NotLinear::Operator)?;
-        let system = System::new(operator, left, led);
+        let system = self.rule.order.system(operator, [left, led]);
         let assembled = begin.elapsed();
         let solved = solve_linear(&system, &self.rule.step)?;
         self.times[0] += assembled + solved.phases[0].1;

@@ -7,6 +7,7 @@
 
 use super::equilibrium::System;
 use super::operator::{Operator, OperatorError, Row};
+use super::order::Order;
 use crate::flock::block::{Block, IDENTITY, apply, plus, product};
 use crate::flock::body::Body;
 use crate::flock::lattice::Site;
@@ -56,37 +57,37 @@ pub fn system(
     let grid = [lattice.vector([1, 0]), lattice.vector([0, 1])];
     let linear = Linear { flock, body, served: served_by_frame(body) };
     let forces = (0..body.count()).map(|i| if follows[i] { linear.force(i) } else { [0.0; 2] }).collect();
-    let operator = match &flock.weights {
-        // The classes of a plain material are those of its rows.
-        Weights::Matrix(weights) if linear.is_plain() => {
-            let mut rows = vec![Row::default(); weights.compliance.len()];
-            let mut known = vec![false; rows.len()];
-            for i in (0..body.count()).filter(|&i| follows[i]) {
-                let class = weights.class[i] as usize;
-                if !std::mem::replace(&mut known[class], true) {
-                    rows[class] = linear.row(i);
-                }
-            }
-            Operator::new(&body.sites, grid, weights.class.clone(), rows, follows)?
-        }
-        _ => Operator::from_rows(&body.sites, grid, follows, |i| linear.row(i))?,
-    };
     let mut held_axes = vec![[false; 2]; if components.is_empty() { 0 } else { body.count() }];
-    for component in components.iter().filter(|component| operator.follows()[component.particle]) {
+    for component in components.iter().filter(|component| follows[component.particle]) {
         let axis = component.axis as usize;
         held_axes[component.particle][axis] = true;
         let mut place = held.get(component.particle);
         place[axis] = component.displacement;
         held.set(component.particle, place);
     }
-    let operator = operator.with_held_axes(held_axes).with_outliers(outlier_places(body));
-    Ok(System::new(operator, forces, held))
-}
-
-/// Where the particles along the outline are, in columns and rows of the lattice.
-pub(super) fn outlier_places(body: &Body) -> Vec<[f64; 2]> {
-    let outliers = body.outline.as_ref().map_or(body.count()..body.count(), |o| o.regular..body.count());
-    outliers.map(|i| body.lattice.grid_coordinates(body.reference.get(i))).collect()
+    let order = Order::new(body);
+    let (sites, outliers) = order.sites();
+    let (sites, follows) = ((&sites[..], outliers), order.by_place(follows));
+    let operator = match &flock.weights {
+        // The classes of a plain material are those of its rows.
+        Weights::Matrix(weights) if linear.is_plain() => {
+            let mut rows = vec![Row::default(); weights.compliance.len()];
+            let mut known = vec![false; rows.len()];
+            let class = order.by_place(weights.class.clone());
+            for (place, &class) in class.iter().enumerate().filter(|(place, _)| follows[*place]) {
+                if !std::mem::replace(&mut known[class as usize], true) {
+                    rows[class as usize] = linear.row(order.particle(place));
+                }
+            }
+            Operator::along_outline(sites, grid, class, rows, follows)
+        }
+        _ => {
+            let row = |place: usize| linear.row(order.particle(place));
+            Operator::from_rows_along_outline(sites, grid, follows, row)
+        }
+    };
+    let operator = operator.map_err(|error| order.error(error))?;
+    Ok(order.system(operator.with_held_axes(order.by_place(held_axes)), [forces, held]))
 }
 
 fn require_linear(flock: &Flock) -> Result<(), NotLinear> {

@@ -8,6 +8,7 @@ pub(crate) mod field;
 pub mod interrupt;
 pub mod linear;
 pub mod operator;
+pub(crate) mod order;
 pub(crate) mod part;
 pub(crate) mod shared;
 pub mod spectrum;

@@ -8,6 +8,7 @@ mod columns;
 mod connected;
 mod kernel;
 mod matrix;
+mod outliers;
 mod packs;
 mod rows;
 #[cfg(test)]
@@ -25,11 +26,13 @@ pub(crate) use kernel::{Particles, RowCoefficients, Task, pass, product};
 #[cfg(test)]
 pub(crate) use matrix::SIZE;
 pub(crate) use matrix::{HELD, Matrix, leads_to_outlier};
+pub(crate) use outliers::Outliers;
 pub(crate) use rows::{RowRef, Rows};
 pub(crate) use window::{Census, Name, fetched, name_of};
 
 use crate::flock::block::{Block, transposed};
 use crate::flock::lattice::Site;
+use crate::ranks::Team;
 
 /// `(K u)_i = diagonal u_i - sum_k block_k u_{i + offset_k}`: what holds a particle back, less what its
 /// neighbours pull it along with \[force / length\].
@@ -99,8 +102,8 @@ pub enum OperatorError {
 }
 
 impl OperatorError {
-    /// The same of a part that begins with the `first` particle of the whole, counted from 0.
-    pub(crate) fn in_whole(mut self, first: usize) -> Self {
+    /// The same with the numbers that the particles have elsewhere, both counted from 0.
+    pub(crate) fn renumbered(mut self, number: impl Fn(usize) -> usize) -> Self {
         let (Self::Order { particle }
         | Self::NoClass { particle, .. }
         | Self::NoNeighbour { particle, .. }
@@ -108,7 +111,7 @@ impl OperatorError {
         else {
             return self;
         };
-        *particle += first;
+        *particle = number(*particle - 1) + 1;
         self
     }
 }
@@ -134,21 +137,23 @@ pub struct Operator {
     pub(super) held_axes: Vec<[bool; 2]>,
 }
 
-/// Particles that stand along an outline and at no site; they are numbered after all others.
-#[derive(Clone, Debug, Default)]
-pub struct Outliers {
-    /// Index of the first one.
-    pub first: usize,
-    /// Where they are, in columns and rows, shape \[count - first\].
-    pub places: Vec<[f64; 2]>,
-}
-
 impl Operator {
     /// `class` names the row of each particle, shape \[count\]; that of particles that do not follow is not
     /// looked at. `sites` ascend, as those of a body do. `grid` are the vectors of one column and of one
     /// row \[length\].
     pub fn new(
         sites: &[Site],
+        grid: [[f64; 2]; 2],
+        class: Vec<u32>,
+        rows: Vec<Row>,
+        follows: Vec<bool>,
+    ) -> Result<Self, OperatorError> {
+        Self::along_outline((sites, Outliers::default()), grid, class, rows, follows)
+    }
+
+    /// The same of particles of which some stand along an outline.
+    pub(crate) fn along_outline(
+        (sites, outliers): (&[Site], Outliers),
         grid: [[f64; 2]; 2],
         mut class: Vec<u32>,
         rows: Vec<Row>,
@@ -158,15 +163,15 @@ impl Operator {
         if classes != count || follows.len() != count {
             return Err(OperatorError::Shapes { sites: count, classes, follows: follows.len() });
         }
-        if let Some(i) = sites.windows(2).position(|pair| pair[0] >= pair[1]) {
+        let order = |site: Site| (outliers.column(site), site);
+        if let Some(i) = sites.windows(2).position(|pair| order(pair[0]) >= order(pair[1])) {
             return Err(OperatorError::Order { particle: i + 2 });
         }
         let known = |i: &usize| !follows[*i] || (class[*i] as usize) < rows.len();
         if let Some(i) = (0..count).find(|i| !known(i)) {
             return Err(OperatorError::NoClass { particle: i + 1, class: class[i], rows: rows.len() });
         }
-        let columns = Columns::new(sites.iter().copied(), |_| true);
-        let outliers = Outliers { first: count, places: Vec::new() };
+        let columns = Columns::new(sites.iter().copied(), &outliers, |_| true);
         let diagonals = rows.iter().flat_map(|row| row.diagonal.as_flattened().iter().copied());
         let stiffness = power_of_two(diagonals);
         let names: Vec<Name> = rows.iter().map(|row| name_of(content(row))).collect();
@@ -186,6 +191,16 @@ impl Operator {
         follows: Vec<bool>,
         row: impl Fn(usize) -> Row,
     ) -> Result<Self, OperatorError> {
+        Self::from_rows_along_outline((sites, Outliers::default()), grid, follows, row)
+    }
+
+    /// The same of particles of which some stand along an outline.
+    pub(crate) fn from_rows_along_outline(
+        (sites, outliers): (&[Site], Outliers),
+        grid: [[f64; 2]; 2],
+        follows: Vec<bool>,
+        row: impl Fn(usize) -> Row,
+    ) -> Result<Self, OperatorError> {
         let mut known: HashMap<Vec<u64>, u32> = HashMap::new();
         let mut rows: Vec<Row> = Vec::new();
         let mut class = vec![0; sites.len()];
@@ -201,13 +216,7 @@ impl Operator {
                 }),
             };
         }
-        Self::new(sites, grid, class, rows, follows)
-    }
-
-    /// The same with its last particles at these places, in columns and rows: those along an outline.
-    pub fn with_outliers(mut self, places: Vec<[f64; 2]>) -> Self {
-        self.outliers = Outliers { first: self.count() - places.len(), places };
-        self
+        Self::along_outline((sites, outliers), grid, class, rows, follows)
     }
 
     /// The same with single components held of followers, shape \[count\]\[x, y\]; their rows for these components are
@@ -242,6 +251,14 @@ impl Operator {
             self.rows = Arc::new(Rows::from(self.rows.iter().map(row).collect::<Vec<_>>()));
             self.stiffness = stiffness;
         }
+        self
+    }
+
+    /// The same with the places of all particles along an outline, of which each rank speaks for those among some particles.
+    pub(super) fn with_all_outliers(mut self, team: &Team, owned: &Range<usize>) -> Self {
+        let own = self.columns.along().filter(|(_, particle)| owned.contains(particle));
+        let own = own.map(|(row, _)| (row, self.outliers.places()[row as usize]));
+        self.outliers = Outliers::among(team, own);
         self
     }
 

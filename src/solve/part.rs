@@ -2,8 +2,7 @@
 //!
 //! A rank owns consecutive groups of columns. Every pass over the particles is made group by group, and every sum is
 //! added up over each group and then over the groups in their order, so ranks change no bit, as threads do not. Each of them
-//! finds what all of them read, and nothing has to be negotiated: where all have the whole matrix, what the rows of each lead to,
-//! and where each has a window of it, the columns around its own.
+//! finds what all of them read, and nothing has to be negotiated: the columns around those of its groups.
 
 use std::ops::Range;
 
@@ -134,14 +133,7 @@ pub struct Part {
 }
 
 impl Part {
-    /// The part of this rank.
-    pub fn new(team: &Team, matrix: &Matrix) -> Self {
-        let cuts = Cuts::new(&matrix.bounds, team.count());
-        let halo = Halo::new(team.rank(), &cuts, |rank| read_by_rows(matrix, cuts.groups_of(rank)));
-        Self { team: team.clone(), cuts, halo }
-    }
-
-    /// The same in a window that begins with the `first` particle of the whole; `read_by` are all that a rank reads.
+    /// The part of this rank in a window that begins with the `first` particle of the whole; `read_by` are all that a rank reads.
     pub fn in_window(team: &Team, cuts: Cuts, first: usize, read_by: impl Fn(usize) -> Range<usize>) -> Self {
         let halo = Halo::new(team.rank(), &cuts, |rank| vec![read_by(rank)]).here(first);
         Self { team: team.clone(), cuts, halo }
@@ -178,39 +170,19 @@ impl Part {
     pub fn receive<T: Real>(&self, v: &mut Vectors<T>) {
         self.halo.receive(&self.team, v);
     }
-
-    /// Makes the whole vector known to every rank.
-    pub fn gather<T: Real>(&self, v: &mut Vectors<T>) {
-        let (own, all) = (self.team.rank(), 0..self.cuts.ranks());
-        let others = all.filter(|&rank| rank != own);
-        let of = |rank: usize| (rank, vec![self.cuts.particles_of(rank)]);
-        let is_any = |(_, of): &(usize, Vec<Range<usize>>)| count(of) > 0;
-        let receives = others.clone().map(of).filter(is_any).collect();
-        let sends = others.map(|rank| (rank, of(own).1)).filter(is_any).collect();
-        Halo { sends, receives }.receive(&self.team, v);
-    }
 }
 
 /// How many particles of others a rank receives before it applies the rows of its own.
 pub fn received_by(matrix: &Matrix, cuts: &Cuts, rank: usize) -> usize {
-    let (own, read) = (cuts.particles_of(rank), joined(read_by_rows(matrix, cuts.groups_of(rank))));
-    [0..own.start, own.end..matrix.count()].iter().map(|others| count(&within(&read, others))).sum()
+    read_by(matrix, cuts, rank).len() - cuts.particles_of(rank).len()
 }
 
-/// Particles outside a rank's groups that their rows lead to.
-fn read_by_rows(matrix: &Matrix, groups: Range<usize>) -> Vec<Range<usize>> {
-    let owned = matrix.bounds[groups.start]..matrix.bounds[groups.end];
-    let mut outside = Vec::new();
-    for run in groups.flat_map(|group| matrix.runs_of(group)) {
-        for &distance in matrix.distances(run) {
-            let start = (run.start as usize).wrapping_add_signed(distance as isize);
-            let end = start + run.len as usize;
-            if start < owned.start || end > owned.end {
-                outside.push(start..end);
-            }
-        }
-    }
-    outside
+/// The particles of a rank and, in whole columns, those that their rows lead to.
+fn read_by(matrix: &Matrix, cuts: &Cuts, rank: usize) -> Range<usize> {
+    let groups = cuts.groups_of(rank);
+    let [first, end] = [groups.start, groups.end].map(|group| matrix.group_columns[group]);
+    let reach = matrix.reach_across();
+    if groups.is_empty() { 0..0 } else { matrix.columns.particles(first - reach..end + reach) }
 }
 
 /// Ascending and apart from each other.
@@ -280,6 +252,11 @@ mod tests {
     use crate::solve::operator::RowCoefficients;
     use crate::solve::operator::samples::{operator, with_outliers};
 
+    fn part(team: &Team, matrix: &Matrix) -> Part {
+        let cuts = Cuts::new(&matrix.bounds, team.count());
+        Part::in_window(team, cuts.clone(), 0, |rank| read_by(matrix, &cuts, rank))
+    }
+
     /// Bodies on every lattice, each in groups of few particles; some have particles along an outline.
     fn matrices() -> Vec<Matrix> {
         let of_kind = |kind: LatticeKind| {
@@ -317,8 +294,7 @@ mod tests {
     fn everything_that_is_read_is_owned_or_received_and_sent_by_its_owner() {
         for matrix in matrices() {
             for ranks in 2..=5 {
-                let parts: Vec<Part> =
-                    in_process(ranks).iter().map(|team| Part::new(team, &matrix)).collect();
+                let parts: Vec<Part> = in_process(ranks).iter().map(|team| part(team, &matrix)).collect();
                 for (rank, part) in parts.iter().enumerate() {
                     let mut known = vec![false; matrix.count()];
                     known[part.cuts.particles_of(rank)].fill(true);
@@ -342,10 +318,10 @@ mod tests {
         }
     }
 
-    /// The product with rows on ranks that know nothing but their own particles, and its sum, as bits.
-    fn product<T: Real>(matrix: &Matrix, team: Option<&Team>) -> (Vec<u64>, u64) {
+    /// The product with rows on ranks that know nothing but their own particles, of these, and its sum, as bits.
+    fn product<T: Real>(matrix: &Matrix, team: Option<&Team>) -> (Vec<[u64; 2]>, Range<usize>, u64) {
         let mut matrix = matrix.clone();
-        matrix.part = team.map(|team| std::sync::Arc::new(Part::new(team, &matrix)));
+        matrix.part = team.map(|team| std::sync::Arc::new(part(team, &matrix)));
         let own =
             matrix.part.as_ref().map_or(0..matrix.count(), |part| part.cuts.particles_of(part.team.rank()));
         let noise = |i: usize| (i as f64 * 0.618_033_988_749_895).fract() - 0.5;
@@ -358,18 +334,21 @@ mod tests {
         let mut out = Vectors::zeros(matrix.count());
         matrix.receive(&mut u);
         let sum = crate::solve::equilibrium::steps::apply(&matrix, &stencils, &u, &mut out);
-        matrix.gather(&mut out);
-        (out.x.iter().chain(&out.y).map(|value| value.bits()).collect(), sum.to_bits())
+        let products = own.clone().map(|i| [out.x[i].bits(), out.y[i].bits()]).collect();
+        (products, own, sum.to_bits())
     }
 
     fn assert_products_agree<T: Real>() {
         for matrix in matrices() {
-            let alone = product::<T>(&matrix, None);
+            let (alone, _, expected) = product::<T>(&matrix, None);
             for ranks in [1, 2, 3, 5, 40] {
                 std::thread::scope(|scope| {
                     for team in in_process(ranks) {
                         let (matrix, alone) = (&matrix, &alone);
-                        scope.spawn(move || assert!(product::<T>(matrix, Some(&team)) == *alone));
+                        scope.spawn(move || {
+                            let (found, own, sum) = product::<T>(matrix, Some(&team));
+                            assert!(found == alone[own] && sum == expected);
+                        });
                     }
                 });
             }
@@ -388,7 +367,7 @@ mod tests {
         std::thread::scope(|scope| {
             for team in in_process(3) {
                 scope.spawn(move || {
-                    let part = Part::new(&team, matrix);
+                    let part = part(&team, matrix);
                     let own = vec![1.0; part.groups().len()];
                     let flags = [Some(2), None].map(|raised| part.sum(&own, raised == Some(team.rank())));
                     let all = matrix.groups() as f64;

@@ -61,6 +61,59 @@ fn the_equilibrium_of_a_body_in_parts_has_the_bits_of_one_laid_out_as_a_whole() 
     }
 }
 
+#[test]
+fn so_has_that_of_a_body_whose_outline_cuts_cells() {
+    let lattice = |kind: &str| format!("lattice={{kind=\"{kind}\",spacing=1.0}}");
+    let [hexagonal, honeycomb] = ["hexagonal", "honeycomb"].map(lattice);
+    let oblique = "lattice={kind=\"oblique\",a=1.0,b=0.9,angle=70.0}";
+    let inclusion = "body.inclusions=[{shape={kind=\"disc\",centre=[15.6,5.4],radius=2.6},\
+         material={kind=\"isotropic\",young=9000.0,poisson=0.2}}]";
+    let turned =
+        "body={shape={kind=\"polygon\",vertices=[[0.2,0.1],[21.3,-0.4],[23.1,7.7],[12.0,9.9],[1.1,8.3]]}}";
+    let long = "body={shape={kind=\"polygon\",vertices=[[0.2,0.1],[60.3,-0.4],[120.1,3.7],[90.0,10.9],[1.1,8.3]]},\
+         holes=[{kind=\"disc\",centre=[30.4,4.3],radius=2.1},{kind=\"disc\",centre=[70.1,5.3],radius=2.6},\
+         {kind=\"disc\",centre=[100.2,5.9],radius=1.3}]}";
+    // Sides along columns that stand at no site.
+    let beside = "body={shape={kind=\"rectangle\",min=[-0.3,0.4],max=[22.4,9.3]}}";
+    let several = "loads=[{kind=\"pressure\",region={kind=\"outline\",hole=1},pressure=9.0},\
+         {kind=\"traction\",region={kind=\"edge\",side=\"top\",depth=4.0},traction=[2.0,7.0],\
+         profile={from=[0.0,0.0],to=[20.0,1.0],factors=[0.5,1.5]}},\
+         {kind=\"force\",region={kind=\"disc\",centre=[17.0,6.0],radius=2.0},force=[0.5,-1.5]},\
+         {kind=\"body\",force=[0.1,-0.7]}]";
+    let places = "record={places=[[16.3,5.8],[2.1,5.5],[20.9,5.0],[12.0,8.0]]}";
+    let held = |side: &str, axis: &str| {
+        format!("{{region={{kind=\"edge\",side=\"{side}\",depth=1.5}},role=\"clamped\",axis=\"{axis}\"}}")
+    };
+    let led = "{region={kind=\"edge\",side=\"right\",depth=1.5},role=\"leader\",axis=\"x\",\
+         motion={kind=\"keyframes\",frames=[{step=20,displacement=[0.8,0.0]}]}}";
+    let pulled = format!("roles=[{},{},{led}]", held("left", "x"), held("bottom", "y"));
+    let at_rest = |solver: &str, sets: &[&str]| {
+        assert_at_rest_the_same(solver, &[&["body.outline=\"fitted\""], sets].concat());
+    };
+    for sets in [
+        &[][..],
+        &[several, places],
+        &[inclusion, several],
+        &[&hexagonal, inclusion, several, places],
+        &[&honeycomb],
+        &["lattice={kind=\"rectangular\",a=1.0,b=0.7}"],
+        &[oblique, several],
+        &[turned],
+        &[turned, &hexagonal],
+        &[long, several],
+        &[long, several, oblique],
+        &[long, &honeycomb],
+        &[beside, &pulled],
+        &[&pulled, several, places],
+    ] {
+        at_rest("multigrid", sets);
+        at_rest("auto", sets);
+    }
+    for solver in ["conjugate-gradients", "direct", "jacobi", "gauss-seidel", "chebyshev"] {
+        at_rest(solver, &[several, &pulled]);
+    }
+}
+
 /// Rules of the paper are linear too, with their frames.
 #[test]
 fn rules_of_the_paper_too() {
@@ -78,12 +131,25 @@ fn a_large_equilibrium_too() {
     assert_at_rest_the_same("multigrid", &["lattice={kind=\"square\",spacing=0.05}"]);
 }
 
+/// The same of a body with particles along its outline, most of which another rank iterates with than lays them out.
+#[test]
+fn a_large_equilibrium_along_an_outline_too() {
+    let fine = "lattice={kind=\"square\",spacing=0.06}";
+    let single = "equilibrium.precision=\"f32\"";
+    let fitted = "body.outline=\"fitted\"";
+    assert_at_rest_the_same("multigrid", &[fitted, fine]);
+    assert_at_rest_the_same("multigrid", &[fitted, fine, single, "equilibrium.tolerance=1e-4"]);
+    let coarser = "lattice={kind=\"square\",spacing=0.1}";
+    assert_at_rest_the_same("conjugate-gradients", &[fitted, coarser, "equilibrium.tolerance=1e-3"]);
+}
+
 #[test]
 fn what_has_no_equilibrium_is_refused_by_all_ranks_with_the_same_words() {
     let asked = "equilibrium={solver=\"multigrid\",tolerance=1e-7}";
     for (what, sets) in [
         ("no particle follows", &["roles=[{region={kind=\"all\"},role=\"clamped\"}]"][..]),
         ("connected to no held particle", &["roles=[]"]),
+        ("connected to no held particle", &["body.outline=\"fitted\"", "roles=[]"]),
         ("not linear", &["rule.mean={kind=\"power\",exponent=2.0}", "neighbours={kind=\"second\"}"]),
     ] {
         let scene = plate(PLATE, &[&[asked, "record.probes=[]"], sets].concat());
@@ -106,7 +172,7 @@ fn what_cannot_be_solved_in_parts_is_laid_out_whole_by_name() {
     let whole_for = |name: &str, sets: &[&str]| laid_out_whole_for(&load(name, sets));
     assert_eq!(whole_for("beam-loaded", &[]), None);
     assert_eq!(whole_for("elastica", &[]).as_deref(), Some("equilibrium"));
-    assert_eq!(whole_for("ring", &[]).as_deref(), Some("equilibrium"));
+    assert_eq!(whole_for("ring", &[]), None);
     assert_eq!(whole_for("beam-loaded", &["load_steps={increments=3}"]).as_deref(), Some("load_steps"));
     let accurate = "equilibrium={accuracy=0.05}";
     assert_eq!(whole_for("beam-loaded", &[accurate]).as_deref(), Some("equilibrium"));

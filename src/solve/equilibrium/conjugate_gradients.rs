@@ -64,8 +64,7 @@ pub(super) fn iterate_single<P: Preconditioner<f32>>(
     Ok(Found { displacement, ..found })
 }
 
-/// Conjugate gradients from zero. `right` becomes the residual. Ranks share the matrix, and all have the result, or each that of
-/// its window.
+/// Conjugate gradients from zero. `right` becomes the residual. Of a matrix that ranks share each has the result of its window.
 pub(super) fn iterate<T: Real, P: Preconditioner<T>>(
     prepared: &Prepared,
     stencils: &RowCoefficients<T>,
@@ -104,7 +103,7 @@ pub(super) fn iterate<T: Real, P: Preconditioner<T>>(
         rz_before = rz;
         history.push_agreed(solver, size / at_start, is_interrupted)?;
     }
-    matrix.gather(&mut x);
+    matrix.receive(&mut x);
     let wide = |values: Vec<T>| values.into_iter().map(Real::wide).collect();
     Ok(Found { displacement: Vectors { x: wide(x.x), y: wide(x.y) }, residuals: history.residuals, set_up })
 }

@@ -7,6 +7,7 @@
 use super::history::History;
 use super::system::Prepared;
 use super::{Found, Request, SolveError, Solver, steps};
+use crate::flock::body::Body;
 use crate::flock::vectors::Vectors;
 use crate::solve::operator::{Matrix, RowCoefficients, product};
 use crate::solve::stopwatch::Stopwatch;
@@ -40,19 +41,18 @@ fn colours(matrix: &Matrix) -> Vec<Vec<Coloured>> {
     let lattice_colours = (across * along) as usize;
     let mut colours = vec![Vec::new(); lattice_colours];
     // Particles along an outline get colours of their own, each the first that none of those it feels has.
-    let mut taken: Vec<usize> = vec![usize::MAX; matrix.outliers.places.len()];
+    let mut taken = vec![usize::MAX; if matrix.outliers.is_empty() { 0 } else { matrix.count() }];
     let mut sites = matrix.columns.sites();
     for (number, run) in matrix.runs().iter().enumerate() {
         for particle in run.start..run.start + run.len {
             // Runs and sites both go through the followers in their numbering.
             let [column, row] = sites.next().expect("a site for each follower");
-            if let Some(k) = (particle as usize).checked_sub(matrix.outliers.first) {
-                let others = matrix.distances(run)[1..].iter();
-                let felt = others.map(|&d| (particle as usize).wrapping_add_signed(d as isize));
-                let felt = felt.filter_map(|j| j.checked_sub(matrix.outliers.first));
-                let known: Vec<usize> = felt.map(|other| taken[other]).collect();
+            if column == Body::ALONG_OUTLINE {
+                let felt = matrix.distances(run)[1..].iter();
+                let felt = felt.map(|&d| taken[(particle as usize).wrapping_add_signed(d as isize)]);
+                let known: Vec<usize> = felt.collect();
                 let colour = (lattice_colours..).find(|colour| !known.contains(colour)).unwrap_or_default();
-                taken[k] = colour;
+                taken[particle as usize] = colour;
                 colours.resize(colours.len().max(colour + 1), Vec::new());
                 colours[colour].push((particle, number as u32));
                 continue;

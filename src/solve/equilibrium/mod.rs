@@ -30,7 +30,6 @@ pub(super) mod steps;
 mod system;
 mod windows;
 
-use std::sync::Arc;
 use std::time::Duration;
 
 pub use choice::{DIRECT_UP_TO, FACTORISED_UP_TO, INCOMPRESSIBLE_UP_TO, UNSYMMETRIC_UP_TO, choose};
@@ -39,7 +38,7 @@ pub use system::System;
 
 use super::interrupt::Interrupt;
 use super::operator::Matrix;
-use super::part::{Cuts, Part, received_by};
+use super::part::{Cuts, received_by};
 use super::stopwatch::Stopwatch;
 use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
@@ -262,7 +261,7 @@ pub fn solve_shared(system: &System, request: &Request, team: Option<&Team>) -> 
         return Err(SolveError::NotFinite { what: "displacement in equilibrium", particle: i + 1 });
     }
     Ok(Solved {
-        displacement,
+        displacement: system.in_body(displacement),
         solver,
         why,
         iterations: residuals.len() - 1,
@@ -280,8 +279,6 @@ pub struct SolverShares {
     pub particles: Vec<usize>,
     /// The most that a rank receives of others before it applies the operator, in particles.
     pub received: usize,
-    /// Whether each sets up the whole: particles at no site are not set up in parts.
-    pub is_set_up_whole: bool,
 }
 
 /// How so many ranks would share a solve; `None` where each would solve the whole system.
@@ -294,20 +291,12 @@ pub fn shared_by(system: &System, solver: Solver, ranks: usize) -> Option<Solver
     let received = |rank: usize| received_by(&matrix, &cuts, rank);
     let particles = (0..ranks).map(|rank| cuts.particles_of(rank).len()).collect();
     let received = (0..ranks).map(received).max().unwrap_or_default();
-    Some(SolverShares { particles, received, is_set_up_whole: !matrix.outliers.places.is_empty() })
+    Some(SolverShares { particles, received })
 }
 
 /// The result of a solver, which is the same on all ranks.
 fn by(solver: Solver, prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
-    let is_whole = prepared.matrix.window.is_none();
-    if is_whole {
-        let part = |team: &Team| Arc::new(Part::new(team, &prepared.matrix));
-        prepared.matrix.part = prepared.team.as_ref().filter(|_| solver.is_shared()).map(part);
-    }
     let found = by_one(solver, prepared, request);
-    if is_whole {
-        prepared.matrix.part = None;
-    }
     // Where each rank solves the whole system, one that is interrupted would leave the others waiting for it later on.
     let is_interrupted = found.as_ref().is_err_and(|error| *error == SolveError::Interrupted);
     let any = |team: &Team| team.any(is_interrupted);

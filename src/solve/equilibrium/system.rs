@@ -26,6 +26,9 @@ pub struct System {
     pub(crate) part: Option<SystemPart>,
     /// Particles that follow, of all ranks.
     followers: usize,
+    /// Index in the body of each particle, where that has them in another order than a system, in which those along an outline come
+    /// with their columns; shape \[count\].
+    numbers: Option<Vec<u32>>,
 }
 
 impl System {
@@ -41,7 +44,13 @@ impl System {
             asymmetric_pair,
             part: None,
             followers,
+            numbers: None,
         }
+    }
+
+    /// The same of particles that have these indices in their body, all of it or a part.
+    pub(crate) fn numbered(self, numbers: Option<Vec<u32>>) -> Self {
+        Self { numbers, ..self }
     }
 
     /// The same as a part of a system of which the other ranks have the others; for all of them together. A particle that is there
@@ -49,7 +58,7 @@ impl System {
     pub(crate) fn of_part(mut self, part: SystemPart) -> Self {
         let team = &part.team;
         let [largest] = team.largest([self.operator.largest_stiffness(part.owned.clone())]);
-        self.operator = self.operator.scaled_to(largest);
+        self.operator = self.operator.scaled_to(largest).with_all_outliers(team, &part.owned);
         let own = self.operator.follows()[part.owned.clone()].iter().filter(|&&follows| follows).count();
         self.followers = team.sum([own as u64])[0] as usize;
         self.part = Some(part);
@@ -66,18 +75,23 @@ impl System {
         self.part.as_ref().map_or(0..self.operator.count(), |part| part.owned.clone())
     }
 
+    /// The index of a particle in the whole body.
+    fn number(&self, particle: usize) -> usize {
+        let first = self.part.as_ref().map_or(0, |part| part.first);
+        self.numbers.as_ref().map_or(first + particle, |numbers| numbers[particle] as usize)
+    }
+
     /// The first of what ranks find in their parts: particles by their number in the whole, and something more.
     pub(super) fn first_found(&self, own: Option<[usize; 2]>) -> Option<[usize; 2]> {
-        let Some(part) = &self.part else { return own };
-        part.first_found(own.map(|[particle, more]| [part.first + particle, more]))
+        let own = own.map(|[particle, more]| [self.number(particle), more]);
+        self.part.as_ref().map_or(own, |part| part.first_found(own))
     }
 
     /// See [`Operator::asymmetric_pair`]; looked for once.
     pub fn asymmetric_pair(&self) -> Option<[usize; 2]> {
         let find = || {
             let own = self.operator.asymmetric_pair(self.owned());
-            let first = self.part.as_ref().map_or(0, |part| part.first);
-            self.first_found(own.map(|[i, other]| [i, first + other]))
+            self.first_found(own.map(|[i, other]| [i, self.number(other)]))
         };
         *self.asymmetric_pair.get_or_init(find)
     }
@@ -97,6 +111,16 @@ impl System {
             Some([i, follows]) => Err(SolveError::NotFinite { what: given[follows].1, particle: i + 1 }),
             None => Ok(()),
         }
+    }
+
+    /// Displacements in the order that the body has its particles in; those of a part are in that.
+    pub(super) fn in_body(&self, displacement: Vectors) -> Vectors {
+        let Some(numbers) = self.numbers.as_ref().filter(|_| self.part.is_none()) else {
+            return displacement;
+        };
+        let mut of_body = Vectors::zeros(displacement.len());
+        numbers.iter().zip(displacement.iter()).for_each(|(&number, u)| of_body.set(number as usize, u));
+        of_body
     }
 
     /// The followers' displacements with those of the held particles.
@@ -227,7 +251,7 @@ impl Prepared {
 
     /// Gives each rank what it needs of the system for a solver: a window, or of one that is not shared all.
     fn share(&mut self, system: &System, solver: Solver) {
-        let is_shared = solver.is_shared() && self.matrix.outliers.places.is_empty();
+        let is_shared = solver.is_shared();
         let of_whole = |team: &Team| SystemPart::of_whole(team, &self.matrix.columns);
         let of_whole = self.team.as_ref().filter(|_| is_shared).map(of_whole);
         let Some(part) = system.part.clone().or(of_whole) else { return };
@@ -290,8 +314,12 @@ impl Prepared {
 
 /// See [`Operator::adrift`].
 fn adrift(system: &System, matrix: &Matrix) -> Option<[usize; 2]> {
-    let Some(part) = &system.part else { return system.operator.adrift(matrix).map(|i| [i, 0]) };
-    system.first_found(system.operator.adrift_of_part(matrix, part).map(|i| [i, 0]))
+    let operator = &system.operator;
+    let found = match &system.part {
+        None => operator.adrift(matrix),
+        Some(part) => operator.adrift_of_part(matrix, part),
+    };
+    system.first_found(found.map(|i| [i, 0]))
 }
 
 /// The first of these particles, counted from 0, that its own row does not hold back.

@@ -7,7 +7,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::multigrid::coarsen::{self, coarsen_columns};
+use super::multigrid::coarsen::{self, coarsen_columns, columns_of_nodes};
 use super::multigrid::descent::Descent;
 use super::multigrid::transfer::Transfer;
 use crate::ranks::Team;
@@ -34,7 +34,7 @@ type Way<'a> = (&'a Transfer, &'a Level);
 impl Level {
     fn new(team: &Team, matrix: Matrix, shares: Vec<Range<i32>>, step: i32) -> Self {
         let census = Arc::new(Census::among(team, &matrix, &shares, step));
-        let reach = team.each([matrix.reach()[0] as u64]).into_iter().flatten().max().unwrap_or(0) as i32;
+        let reach = team.each([matrix.reach_across() as u64]).into_iter().flatten().max().unwrap_or(0) as i32;
         let cuts = Cuts::new(&census.groups().0, team.count());
         let mut level = Self { matrix, shares, census, reach, cuts, own: Vec::new() };
         level.cut(team);
@@ -66,6 +66,11 @@ impl Level {
         fetched(team, &self.matrix, (&self.shares, self.census.step), &wants)
     }
 
+    /// The columns of this one that some of the next coarser one are computed from.
+    fn below(&self, way: Transfer, coarse: &Range<i32>) -> Range<i32> {
+        way.columns_below(coarse, &self.matrix.outliers)
+    }
+
     /// The columns that a rank iterates with, if there are any.
     fn own_of(&self, rank: usize) -> Option<&Range<i32>> {
         Some(&self.own[rank]).filter(|own| !own.is_empty())
@@ -79,8 +84,10 @@ impl Level {
     /// What this rank needs of it, with the ways from the level above and to the one below.
     fn window(&self, team: &Team, (above, below): (Option<Way<'_>>, Option<Way<'_>>)) -> Matrix {
         let wants = |rank: usize| {
-            let down = below.and_then(|(way, level)| Some(way.columns_below(level.own_of(rank)?)));
-            let up = above.and_then(|(way, level)| Some(way.columns_above(level.own_of(rank)?)));
+            let down = below.and_then(|(way, level)| Some(self.below(*way, level.own_of(rank)?)));
+            let up = above.and_then(|(way, level)| {
+                Some(way.columns_above(level.own_of(rank)?, &level.matrix.outliers))
+            });
             let all = [self.read_by(rank), down, up].into_iter().flatten();
             all.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end)).unwrap_or(0..0)
         };
@@ -91,15 +98,16 @@ impl Level {
 
     /// The next coarser one.
     fn coarser(&self, team: &Team, transfer: Transfer) -> Self {
-        let (across, all) = (transfer.steps[0], self.census.range());
-        let (first, end) = (all.start.div_euclid(across), (all.end - 1).div_euclid(across) + 2);
+        let across = transfer.steps[0];
+        let Range { start: first, end } =
+            columns_of_nodes(self.census.range(), transfer, &self.matrix.outliers);
         let begin = |rank: usize| match rank {
             0 => first,
             _ if rank == team.count() => end,
             _ => (self.shares[rank].start + across - 1).div_euclid(across).clamp(first, end),
         };
         let shares: Vec<_> = (0..team.count()).map(|rank| begin(rank)..begin(rank + 1)).collect();
-        let below = |share: &Range<i32>| if share.is_empty() { 0..0 } else { transfer.columns_below(share) };
+        let below = |share: &Range<i32>| if share.is_empty() { 0..0 } else { self.below(transfer, share) };
         let fine = self.fetched(team, &shares.iter().map(below).collect::<Vec<_>>());
         let matrix = coarsen_columns(&fine, transfer, shares[team.rank()].clone());
         Self::new(team, matrix, shares, coarsen::STEP)
@@ -152,9 +160,9 @@ pub(super) fn whole_of_part(part: &SystemPart, matrix: Matrix) -> Matrix {
     let team = &part.team;
     let (shares, step) = part.columns(&matrix.columns);
     let all = shares[0].start..shares[shares.len() - 1].end;
-    let Matrix { columns, class, rows, .. } =
+    let Matrix { columns, class, rows, outliers, .. } =
         fetched(team, &matrix, (&shares, step), &vec![all; team.count()]);
-    Matrix::compile(columns, class, rows)
+    Matrix { outliers, ..Matrix::compile(columns, class, rows) }
 }
 
 #[cfg(test)]

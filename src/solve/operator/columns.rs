@@ -1,6 +1,10 @@
 //! Which particle stands at a site, without a map: the numbering runs column by column from the bottom,
-//! so a column is a few stretches of evenly spaced rows with ascending indices.
+//! so a column is a few stretches of evenly spaced rows with ascending indices. Particles along an outline come after the others
+//! of their column; their rows are their numbers along the outline, in a column of their own.
 
+use std::ops::Range;
+
+use super::outliers::Outliers;
 use crate::flock::body::Body;
 use crate::flock::lattice::Site;
 
@@ -34,45 +38,50 @@ pub struct Columns {
     segments: Vec<Segment>,
     /// Index of the first particle of each column, whether in a segment or not, shape \[columns + 1\].
     begins: Vec<u32>,
-    /// Segments of the particles along an outline, which are numbered after all columns.
-    outliers: Vec<Segment>,
+    /// Segments of the particles along an outline, each within a column, ascending by index.
+    along: Vec<Segment>,
+    /// The same, ascending by row.
+    along_by_row: Vec<Segment>,
 }
 
 /// Column of the particles along an outline.
 const OUTLIERS: i32 = Body::ALONG_OUTLINE;
 
 impl Columns {
-    /// Segments of the particles for which `counts` holds; `sites` ascend.
-    pub fn new(sites: impl Iterator<Item = Site> + Clone, counts: impl Fn(usize) -> bool) -> Self {
-        let mut steps = sites.clone().zip(sites.clone().skip(1)).filter(|(a, b)| a[0] == b[0]);
+    /// Segments of the particles for which `counts` holds; `sites` ascend, those of `outliers` in their columns.
+    pub fn new(
+        sites: impl Iterator<Item = Site> + Clone,
+        outliers: &Outliers,
+        counts: impl Fn(usize) -> bool,
+    ) -> Self {
+        let of_column = |(a, b): &(Site, Site)| a[0] == b[0] && a[0] != OUTLIERS;
+        let mut steps = sites.clone().zip(sites.clone().skip(1)).filter(of_column);
         // The sites of a column are evenly spaced on every lattice, so that the first few suffice.
         let step = steps.by_ref().take(4096).map(|(a, b)| b[1] - a[1]).min();
         let known = step.is_some();
-        Self { knows_step: known, ..Self::with_step(step.unwrap_or(1).max(1), sites, counts) }
+        let mut columns = Self { step: step.unwrap_or(1).max(1), knows_step: known, ..Self::default() };
+        let mut count = 0;
+        for (index, site) in sites.enumerate() {
+            columns.open(outliers.column(site), index);
+            count = index + 1;
+            match site[0] {
+                _ if !counts(index) => {}
+                OUTLIERS => columns.push_along(site[1], index, 1),
+                _ => columns.push(site[1], index, 1),
+            }
+        }
+        columns.end(count);
+        columns
     }
 
     /// The same of columns whose particles stand so many rows apart, where none is missing.
-    pub fn with_step(step: i32, sites: impl Iterator<Item = Site>, counts: impl Fn(usize) -> bool) -> Self {
+    pub fn with_step(step: i32, sites: impl Iterator<Item = Site>) -> Self {
         let mut columns = Self { step, ..Self::default() };
-        // The site before, if it ended a segment that may go on.
-        let mut last: Option<Site> = None;
         let mut count = 0;
         for (index, site) in sites.enumerate() {
-            let is_outlier = site[0] == OUTLIERS;
-            if !is_outlier {
-                columns.open(site[0], index);
-                count = index + 1;
-            }
-            if !counts(index) {
-                last = None;
-                continue;
-            }
-            let segments = if is_outlier { &mut columns.outliers } else { &mut columns.segments };
-            match segments.last_mut() {
-                Some(segment) if last == Some([site[0], site[1].wrapping_sub(step)]) => segment.len += 1,
-                _ => segments.push(Segment { row: site[1], start: index as u32, len: 1 }),
-            }
-            last = Some(site);
+            columns.open(site[0], index);
+            columns.push(site[1], index, 1);
+            count = index + 1;
         }
         columns.end(count);
         columns
@@ -98,9 +107,20 @@ impl Columns {
         }
     }
 
+    /// Adds so many particles along an outline, which have these rows, to the column that was begun last.
+    pub fn push_along(&mut self, row: i32, index: usize, len: usize) {
+        let begun = self.begins.last().copied().unwrap_or(0);
+        match self.along.last_mut().filter(|last| last.start >= begun) {
+            Some(last) if last.ends_before(row, index, self.step) => last.len += len as u32,
+            _ => self.along.push(Segment { row, start: index as u32, len: len as u32 }),
+        }
+    }
+
     /// Ends the last column of so many particles in all.
     pub fn end(&mut self, count: usize) {
         self.open_next(count);
+        self.along_by_row.clone_from(&self.along);
+        self.along_by_row.sort_unstable_by_key(|segment| segment.row);
     }
 
     /// The number of the column that a particle is in.
@@ -119,8 +139,8 @@ impl Columns {
         }
     }
 
-    /// Numbers of the columns of the lattice.
-    pub fn range(&self) -> std::ops::Range<i32> {
+    /// Numbers of the columns.
+    pub fn range(&self) -> Range<i32> {
         self.first..self.first + self.begins.len() as i32 - 1
     }
 
@@ -133,18 +153,15 @@ impl Columns {
         self.knows_step.then_some(self.step)
     }
 
-    /// Indices of the particles of these columns of the lattice, as far as there are any.
-    pub fn particles(&self, columns: std::ops::Range<i32>) -> std::ops::Range<usize> {
+    /// Indices of the particles of these columns, as far as there are any.
+    pub fn particles(&self, columns: Range<i32>) -> Range<usize> {
         let last = self.begins.len() as i32 - 1;
         let begin = |column: i32| self.begins[(column - self.first).clamp(0, last) as usize] as usize;
         begin(columns.start)..begin(columns.end)
     }
 
-    /// Segments of a column, from the bottom; none where there is no such column.
+    /// Segments of the sites of a column, from the bottom; none where there is no such column.
     pub fn of(&self, column: i32) -> &[Segment] {
-        if column == OUTLIERS {
-            return &self.outliers;
-        }
         if !self.range().contains(&column) {
             return &[];
         }
@@ -152,14 +169,31 @@ impl Columns {
         &self.segments[self.starts[c] as usize..self.starts[c + 1] as usize]
     }
 
-    /// Numbers of all columns, that of the particles along an outline last.
-    fn all(&self) -> impl Iterator<Item = i32> + Clone {
-        self.range().chain([OUTLIERS])
+    /// Segments of the particles along an outline in a column.
+    fn along_of(&self, column: i32) -> &[Segment] {
+        let particles = self.particles(column..column + 1);
+        let begin = |at: usize| self.along.partition_point(|segment| (segment.start as usize) < at);
+        &self.along[begin(particles.start)..begin(particles.end)]
     }
 
-    /// Column, and segment, of every segment in order.
-    pub fn iter(&self) -> impl Iterator<Item = (i32, Segment)> + '_ {
-        self.all().flat_map(|column| self.of(column).iter().map(move |&segment| (column, segment)))
+    /// Column of the sites, and segment, of every segment of these columns in order.
+    pub fn segments(&self, columns: Range<i32>) -> impl Iterator<Item = (i32, Segment)> + Clone + '_ {
+        columns.flat_map(move |column| {
+            let of_sites = self.of(column).iter().map(move |&segment| (column, segment));
+            of_sites.chain(self.along_of(column).iter().map(|&segment| (OUTLIERS, segment)))
+        })
+    }
+
+    /// The same of all columns.
+    pub fn iter(&self) -> impl Iterator<Item = (i32, Segment)> + Clone + '_ {
+        self.segments(self.range())
+    }
+
+    /// Rows and indices of the particles along an outline that are in segments, ascending by index.
+    pub fn along(&self) -> impl Iterator<Item = (i32, usize)> + Clone + '_ {
+        self.along.iter().flat_map(move |&Segment { row, start, len }| {
+            (0..len).map(move |k| (row + self.step * k as i32, (start + k) as usize))
+        })
     }
 
     /// Columns, and rows, from the first to the last that has a particle.
@@ -169,13 +203,10 @@ impl Columns {
         [self.range().len() as i32, rows.map_or(0, |[low, high]| (high - low) / self.step + 1)]
     }
 
-    /// Sites of all particles in segments, ascending.
+    /// Sites of all particles in segments, ascending by index.
     pub fn sites(&self) -> impl Iterator<Item = Site> + Clone + '_ {
-        let of_segment = move |column: i32, segment: Segment| {
+        self.iter().flat_map(move |(column, segment)| {
             (0..segment.len as i32).map(move |k| [column, segment.row + self.step * k])
-        };
-        self.all().flat_map(move |column| {
-            self.of(column).iter().flat_map(move |&segment| of_segment(column, segment))
         })
     }
 
@@ -188,7 +219,7 @@ impl Columns {
 
     /// The particle at a site, and how many follow it in its segment, itself included.
     pub fn find(&self, [column, row]: Site) -> Option<(usize, usize)> {
-        let segments = self.of(column);
+        let segments = if column == OUTLIERS { &self.along_by_row[..] } else { self.of(column) };
         let after = segments.partition_point(|segment| segment.row <= row);
         let segment = segments[..after].last()?;
         let away = row - segment.row;
@@ -198,7 +229,7 @@ impl Columns {
             .then(|| ((segment.start as i32 + steps) as usize, (segment.len as i32 - steps) as usize))
     }
 
-    /// The columns of the lattice, each with the index of its first particle, and the end of the last one.
+    /// The columns, each with the index of its first particle, and the end of the last one.
     pub fn begins(&self) -> impl Iterator<Item = (i32, usize)> + '_ {
         (self.first..).zip(self.begins.iter().map(|&begin| begin as usize))
     }
@@ -208,8 +239,7 @@ impl Columns {
 pub type Begin = (i32, usize, u64);
 
 /// Index bounds of groups of whole columns that cost at least `size` but for the last, with the number of the column that
-/// each begins with: `[begin of the first, ..., end of the last]`. Where a particle along an outline is a column, these fill up
-/// the last group; what is left of them are groups without columns.
+/// each begins with: `[begin of the first, ..., end of the last]`.
 pub fn groups(begins: impl Iterator<Item = Begin>, end: Begin, size: u64) -> (Vec<usize>, Vec<i32>) {
     let (mut bounds, mut columns, mut before) = (Vec::new(), Vec::new(), 0);
     for (column, begin, cost) in begins {
@@ -241,7 +271,7 @@ mod tests {
             let (body, _) =
                 Body::build(lattice, &cut, &Neighbourhood::First { keep: None }, None).expect("fits");
             let counts = |i: usize| i % 7 != 3;
-            let columns = Columns::new(body.sites.iter().copied(), counts);
+            let columns = Columns::new(body.sites.iter().copied(), &Outliers::default(), counts);
             for i in -2..40 {
                 for j in -2..14 {
                     let there = body.sites.binary_search(&[i, j]).ok().filter(|&k| counts(k));

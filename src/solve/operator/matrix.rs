@@ -5,11 +5,12 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::columns::{Columns, groups};
+use super::columns::{Begin, Columns, groups};
+use super::outliers::Outliers;
 use super::packs::Packs;
 use super::rows::{RowRef, Rows};
-use super::window::{Census, Name, Window, name_of};
-use super::{Operator, Outliers, Stretch, add};
+use super::window::{Census, Name, Window, cost_of, name_of};
+use super::{Operator, Stretch, add};
 use crate::flock::block::Block;
 use crate::flock::body::Body;
 use crate::flock::lattice::Site;
@@ -129,7 +130,6 @@ impl Matrix {
 
     /// The same without the runs that passes go over.
     pub fn uncompiled(columns: Columns, class: Vec<u32>, (rows, names): (Rows, Vec<Name>)) -> Self {
-        let outliers = Outliers { first: class.len(), ..Outliers::default() };
         Self {
             columns,
             class,
@@ -141,7 +141,7 @@ impl Matrix {
             group_columns: Vec::new(),
             group_runs: Vec::new(),
             packs: Packs::default(),
-            outliers,
+            outliers: Outliers::default(),
             part: None,
             window: None,
         }
@@ -154,7 +154,7 @@ impl Matrix {
         let (bounds, group_columns) = census.groups();
         let [begin, end] = [part.groups().start, part.groups().end].map(|group| group_columns[group]);
         let mut runs = Runs::default();
-        for (column, segment) in self.columns.iter().filter(|(column, _)| (begin..end).contains(column)) {
+        for (column, segment) in self.columns.segments(begin..end) {
             let rows = (&self.columns, &self.class[..], &self.rows);
             runs.find(rows, [column, segment.row], segment.start..segment.start + segment.len);
         }
@@ -202,21 +202,16 @@ impl Matrix {
 
     /// Cuts the body into groups that cost at least `size` of what all cost.
     fn group(&mut self, size: impl FnOnce(u64) -> u64) {
-        let mut cost = vec![0; self.count() + 1];
-        for run in &self.runs {
-            cost[run.start as usize + 1..][..run.len as usize].fill(cost_of_each(run.len));
-        }
         let mut sum = 0;
-        for cost in &mut cost {
-            sum += *cost;
-            *cost = sum;
-        }
-        let (after, regular) = (self.columns.range().end, self.columns.particles(self.columns.range()).end);
-        let outliers = (regular + 1..self.count()).map(|begin| (after, begin));
-        let begins = self.columns.begins().chain(outliers);
-        let begins = begins.map(|(column, begin)| (column, begin, u64::from(cost[begin])));
-        let sum = u64::from(sum);
-        (self.bounds, self.group_columns) = groups(begins, (after, self.count(), sum), size(sum));
+        let begins: Vec<Begin> = (self.columns.begins())
+            .map(|(column, begin)| {
+                let before = sum;
+                sum += cost_of(self, column);
+                (column, begin, before)
+            })
+            .collect();
+        let end = (self.columns.range().end, self.count(), sum);
+        (self.bounds, self.group_columns) = groups(begins.into_iter(), end, size(sum));
         self.pack();
     }
 
@@ -236,7 +231,8 @@ impl Matrix {
 
     /// The rows of the operator without what they owe to held particles.
     pub fn of_followers(operator: &Operator) -> Self {
-        let columns = Columns::new(operator.columns.sites(), |i| operator.follows[i]);
+        let outliers = operator.outliers.clone();
+        let columns = Columns::new(operator.columns.sites(), &outliers, |i| operator.follows[i]);
         let mut class = vec![HELD; operator.count()];
         let mut rows = Rows::sharing(&operator.rows);
         let mut names = operator.names.clone();
@@ -277,7 +273,6 @@ impl Matrix {
             runs.find((&columns, &class, &rows), site, start as u32..(start + len) as u32);
             None
         });
-        let outliers = operator.outliers.clone();
         Self { outliers, names, ..Self::of_runs(columns, class, rows, runs) }
     }
 
@@ -327,15 +322,6 @@ impl Matrix {
         }
     }
 
-    /// Makes the whole vector known to every rank; where each has a window, what the rows of its particles lead to.
-    pub fn gather<T: Real>(&self, v: &mut Vectors<T>) {
-        match &self.part {
-            Some(part) if self.window.is_some() => part.receive(v),
-            Some(part) => part.gather(v),
-            None => (),
-        }
-    }
-
     /// Runs of a group.
     pub fn runs_of(&self, group: usize) -> &[Run] {
         &self.runs[self.group_runs[group]..self.group_runs[group + 1]]
@@ -349,6 +335,20 @@ impl Matrix {
     /// the row's entries.
     pub fn distances(&self, run: &Run) -> &[i32] {
         &self.distances[run.distances as usize..][..run.terms as usize]
+    }
+
+    /// Most columns from a particle to another that its row leads to, of the rows that are compiled.
+    pub fn reach_across(&self) -> i32 {
+        if self.outliers.is_empty() {
+            return self.reach()[0];
+        }
+        let column = |particle: u32| self.columns.column_of(particle as usize);
+        let of_run = |run: &Run| {
+            let here = column(run.start);
+            let others = self.distances(run)[1..].iter();
+            others.map(|&distance| (column(run.start.wrapping_add_signed(distance)) - here).abs()).max()
+        };
+        self.runs.iter().filter_map(of_run).max().unwrap_or(0)
     }
 
     /// Most columns and rows that an entry between two sites of the lattice reaches.

@@ -1,6 +1,6 @@
 //! Bodies for tests: every lattice, ragged edges, holes, held particles, blocks of any kind.
 
-use super::{Operator, Row};
+use super::{Operator, Outliers, Row};
 use crate::flock::block::{Block, plus};
 use crate::flock::body::{Body, Cut};
 use crate::flock::lattice::{Lattice, LatticeKind, Site};
@@ -44,30 +44,25 @@ fn spring([x, y]: [f64; 2]) -> Block {
     ]
 }
 
-/// The same operator with some of its particles along an outline: numbered last, at no site, somewhat beside where they
-/// were; of some of the others one component is held.
+/// The same operator with some of its particles along an outline: after the others of their column, at no site, somewhat beside
+/// where they were; of some of the others one component is held.
 pub fn with_outliers(operator: &Operator) -> Operator {
     let sites: Vec<Site> = operator.columns.sites().collect();
     let is_outlier = |i: usize| i % 7 == 3;
-    let order: Vec<usize> = (0..sites.len())
-        .filter(|&i| !is_outlier(i))
-        .chain((0..sites.len()).filter(|&i| is_outlier(i)))
-        .collect();
-    let regular = (0..sites.len()).filter(|&i| !is_outlier(i)).count();
     let step = operator.columns.step();
-    let new_site = |number: usize| match number.checked_sub(regular) {
-        None => sites[order[number]],
-        Some(k) => [Body::ALONG_OUTLINE, k as i32 * step],
-    };
-    let mut number = vec![0; sites.len()];
-    order.iter().enumerate().for_each(|(new, &old)| number[old] = new);
-    let new_sites: Vec<Site> = (0..sites.len()).map(new_site).collect();
+    // Along the outline forth through the body and back again.
+    let along: Vec<usize> = (0..sites.len()).filter(|&i| is_outlier(i)).collect();
+    let along: Vec<usize> =
+        along.iter().step_by(2).chain(along.iter().skip(1).step_by(2).rev()).copied().collect();
+    let mut new_sites = sites.clone();
+    along.iter().zip(0..).for_each(|(&i, k)| new_sites[i] = [Body::ALONG_OUTLINE, k * step]);
+    let mut order: Vec<usize> = (0..sites.len()).collect();
+    order.sort_by_key(|&i| (sites[i][0], new_sites[i]));
     let row = |new: usize| {
         let old = order[new];
         let offset = |offset: Site| {
-            let other = operator.index_of(sites[old], offset);
-            let there = new_sites[number[other]];
-            [there[0] - new_sites[new][0], there[1] - new_sites[new][1]]
+            let there = new_sites[operator.index_of(sites[old], offset)];
+            [there[0] - new_sites[old][0], there[1] - new_sites[old][1]]
         };
         let row = operator.row(old);
         Row { diagonal: row.diagonal, entries: row.entries.iter().map(|&(o, b)| (offset(o), b)).collect() }
@@ -75,9 +70,11 @@ pub fn with_outliers(operator: &Operator) -> Operator {
     let follows = order.iter().map(|&old| operator.follows()[old]).collect();
     let beside = |k: usize| 0.3 * (k as f64 * 0.618).fract() - 0.1;
     let place =
-        |&old: &usize| [f64::from(sites[old][0]) + beside(old), f64::from(sites[old][1]) - beside(3 * old)];
-    let places = order[regular..].iter().map(place).collect();
+        |old: usize| [f64::from(sites[old][0]) + beside(old), f64::from(sites[old][1]) - beside(3 * old)];
+    let places = along.iter().map(|&old| (new_sites[old][1], place(old)));
     let held = (0..sites.len()).map(|new| [new % 23 == 11, new % 31 == 5]).collect();
-    let made = Operator::from_rows(&new_sites, operator.grid, follows, row).expect("an operator");
-    made.with_outliers(places).with_held_axes(held)
+    let ordered: Vec<Site> = order.iter().map(|&old| new_sites[old]).collect();
+    let outliers = Outliers::new(places);
+    let made = Operator::from_rows_along_outline((&ordered, outliers), operator.grid, follows, row);
+    made.expect("an operator").with_held_axes(held)
 }

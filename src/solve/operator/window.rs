@@ -13,6 +13,7 @@ use super::columns::{Columns, groups};
 use super::matrix::{HELD, Matrix, cost_of_each, group_size};
 use super::rows::Rows;
 use crate::flock::block::Block;
+use crate::flock::body::Body;
 use crate::flock::lattice::Site;
 use crate::flock::splitmix::{STEP, mixed};
 use crate::ranks::Team;
@@ -119,37 +120,40 @@ impl Census {
     }
 }
 
-/// Particles of one class in a row, of a segment: row and index of the first one, how many, class.
-type Stretch = (i32, usize, usize, u32);
+/// Particles of one class in a row, of a segment: site and index of the first one, how many, class.
+type Stretch = (Site, usize, usize, u32);
 
 /// The stretches of a column; those of particles that do not follow are in no row.
 fn stretches(matrix: &Matrix, column: i32) -> Vec<Stretch> {
     let (mut stretches, particles) = (Vec::new(), matrix.columns.particles(column..column + 1));
     let mut at = particles.start;
-    for segment in matrix.columns.of(column) {
+    for (of, segment) in matrix.columns.segments(column..column + 1) {
         let [start, end] = [segment.start, segment.start + segment.len].map(|index| index as usize);
         if at < start {
-            stretches.push((0, at, start - at, HELD));
+            stretches.push(([of, 0], at, start - at, HELD));
         }
         at = start;
         for alike in matrix.class[start..end].chunk_by(|a, b| a == b) {
             let row = segment.row + matrix.columns.step() * (at - start) as i32;
-            stretches.push((row, at, alike.len(), alike[0]));
+            stretches.push(([of, row], at, alike.len(), alike[0]));
             at += alike.len();
         }
     }
     if at < particles.end {
-        stretches.push((0, at, particles.end - at, HELD));
+        stretches.push(([column, 0], at, particles.end - at, HELD));
     }
     stretches
 }
 
-/// The cost of a column: particles that stand one after the other with one class are a run, as their neighbours stand one after
-/// the other too.
-fn cost_of(matrix: &Matrix, column: i32) -> u64 {
+/// The cost of a column: particles that stand one after the other with one class are a run, as hardly ever their neighbours do not
+/// stand one after the other too.
+pub(super) fn cost_of(matrix: &Matrix, column: i32) -> u64 {
     let follow = stretches(matrix, column).into_iter().filter(|(.., class)| *class != HELD);
     follow.map(|(_, _, len, _)| len as u64 * u64::from(cost_of_each(len as u32))).sum()
 }
+
+/// Marks particles that stand along an outline.
+const ALONG: u64 = 1 << 32;
 
 /// Columns as words: those of each column, then those of the rows that they have.
 fn packed(matrix: &Matrix, columns: Range<i32>, step: i32) -> Vec<u64> {
@@ -159,7 +163,8 @@ fn packed(matrix: &Matrix, columns: Range<i32>, step: i32) -> Vec<u64> {
     for column in columns {
         let head = words.len();
         words.push(0);
-        for (row, _, len, class) in stretches(matrix, column) {
+        for ([of, row], _, len, class) in stretches(matrix, column) {
+            let is_along = if of == Body::ALONG_OUTLINE { ALONG } else { 0 };
             let class = match class {
                 HELD => HELD,
                 class => {
@@ -175,7 +180,8 @@ fn packed(matrix: &Matrix, columns: Range<i32>, step: i32) -> Vec<u64> {
             let pieces = if is_other && class != HELD { len } else { 1 };
             for piece in 0..pieces {
                 let row = row + matrix.columns.step() * piece as i32;
-                words.extend([u64::from(row as u32) | ((len / pieces) as u64) << 32, u64::from(class)]);
+                let word = u64::from(row as u32) | ((len / pieces) as u64) << 32;
+                words.extend([word, u64::from(class) | is_along]);
             }
         }
         words[head] = ((words.len() - head - 1) / 2) as u64;
@@ -223,8 +229,10 @@ impl Assembly {
             self.columns.open_next(self.class.len());
             for of in of_column.chunks_exact(2) {
                 let (row, len, class) = (of[0] as u32 as i32, (of[0] >> 32) as usize, of[1] as u32);
-                if class != HELD {
-                    self.columns.push(row, self.class.len(), len);
+                match of[1] & ALONG {
+                    _ if class == HELD => {}
+                    ALONG => self.columns.push_along(row, self.class.len(), len),
+                    _ => self.columns.push(row, self.class.len(), len),
                 }
                 self.class.resize(self.class.len() + len, class);
             }
@@ -293,5 +301,5 @@ pub fn fetched(
             () => assembly.add(columns.len(), &arrived.next().expect("as many as were sent")),
         }
     }
-    assembly.into_matrix()
+    Matrix { outliers: matrix.outliers.clone(), ..assembly.into_matrix() }
 }

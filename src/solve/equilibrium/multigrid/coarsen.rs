@@ -23,8 +23,37 @@ const NEIGHBOURS: usize = 16;
 
 /// The matrix of the coarse grid, and the shares of particles at no site in its nodes.
 pub fn coarsen(fine: &Matrix, transfer: Transfer) -> (Matrix, OutlierShares) {
-    let parents = Parents::new(transfer.steps);
     let of_outliers = OutlierParents::new(fine, transfer.steps);
+    let columns = columns_of_nodes(fine.columns.range(), transfer, &fine.outliers);
+    let Matrix { columns, class, rows, .. } = nodes_of(fine, transfer, &of_outliers, columns);
+    let coarse = Matrix::compile(columns, class, rows);
+    let shares = of_outliers.shares(&coarse.columns);
+    (coarse, shares)
+}
+
+/// The shares of particles at no site in the nodes of a coarse grid, as far as either are here.
+pub fn outlier_shares(fine: &Matrix, transfer: Transfer, coarse: &Matrix) -> OutlierShares {
+    OutlierParents::new(fine, transfer.steps).shares(&coarse.columns)
+}
+
+/// Some columns of the coarse grid, not compiled, with what they need of the fine one at hand.
+pub fn coarsen_columns(fine: &Matrix, transfer: Transfer, columns: Range<i32>) -> Matrix {
+    nodes_of(fine, transfer, &OutlierParents::new(fine, transfer.steps), columns)
+}
+
+/// Rows of a column from one node to the next.
+pub const STEP: i32 = 1;
+
+/// The columns in which nodes may stand that particles of these fine ones have a share in.
+pub fn columns_of_nodes(fine: Range<i32>, transfer: Transfer, outliers: &Outliers) -> Range<i32> {
+    if fine.is_empty() { 0..0 } else { transfer.columns_above(&fine, outliers) }
+}
+
+/// First word of the names of rows that are of one node each.
+const SINGLE: u64 = u64::MAX;
+
+fn nodes_of(fine: &Matrix, transfer: Transfer, of_outliers: &OutlierParents, columns: Range<i32>) -> Matrix {
+    let parents = Parents::new(transfer.steps);
     let mut patterns = Patterns::new(fine, transfer);
     let mut nodes: Vec<(Site, u32)> = Vec::new();
     // Nodes whose rows are summed one by one, and the particles at no site that have a share in each.
@@ -32,12 +61,11 @@ pub fn coarsen(fine: &Matrix, transfer: Transfer) -> (Matrix, OutlierShares) {
         .children
         .chunk_by(|a, b| a.node == b.node)
         .map(|of_node| (of_node[0].node, of_node))
+        .filter(|([column, _], _)| columns.contains(column))
         .collect();
     let mut beside = Vec::new();
-    let across = transfer.steps[0];
-    let columns = fine.columns.range();
     let mut left = singles.iter().peekable();
-    for column in columns.start.div_euclid(across)..=(columns.end - 1).div_euclid(across) + 1 {
+    for column in columns {
         // Nodes are asked about in their order.
         let has_outlier = |row: i32| {
             while left.next_if(|(node, _)| *node < [column, row]).is_some() {}
@@ -57,7 +85,7 @@ pub fn coarsen(fine: &Matrix, transfer: Transfer) -> (Matrix, OutlierShares) {
     nodes.extend(singles.iter().zip(0..).map(|((node, _), class)| (*node, class)));
     let mut pieces = in_pieces(&singles, PIECE, |singles| {
         let (mut rows, mut sums) = (Rows::with_capacity(singles.len(), NEIGHBOURS), Sums::default());
-        let mut halves = Halves::new(fine, &parents, &of_outliers);
+        let mut halves = Halves::new(fine, &parents, of_outliers);
         for (node, of_node) in singles {
             halves.add_row(*node, of_node, &mut sums);
             rows.push_blocks(sums.drain());
@@ -65,33 +93,23 @@ pub fn coarsen(fine: &Matrix, transfer: Transfer) -> (Matrix, OutlierShares) {
         rows
     });
     pieces.extend(rows_of(fine, &parents, &patterns));
+    // Of the rows of a grid that one rank has whole nothing is asked by name.
+    let names = match fine.names.is_empty() {
+        true => Vec::new(),
+        false => {
+            let name = |class: &u32| fine.names.get(*class as usize).copied().unwrap_or_default();
+            let of_pattern = |pattern: &&[u32]| name_of(pattern.iter().flat_map(name));
+            let of_single = |(node, _): &(Site, &[Child])| {
+                name_of([SINGLE].into_iter().chain(node.map(|at| i64::from(at) as u64)))
+            };
+            singles.iter().map(of_single).chain(patterns.iter().map(of_pattern)).collect()
+        }
+    };
     // Ascending lists one after the other, which a stable sort joins.
     nodes.sort();
-    let columns = Columns::with_step(STEP, nodes.iter().map(|&(site, _)| site), |_| true);
-    let shares = of_outliers.shares(&nodes);
-    (
-        Matrix::compile(columns, nodes.into_iter().map(|(_, class)| class).collect(), Rows::joined(pieces)),
-        shares,
-    )
-}
-
-/// Rows of a column from one node to the next.
-pub const STEP: i32 = 1;
-
-/// Some columns of the coarse grid of a body without particles at no site, with what they need of the fine one at hand.
-pub fn coarsen_columns(fine: &Matrix, transfer: Transfer, columns: Range<i32>) -> Matrix {
-    let mut patterns = Patterns::new(fine, transfer);
-    let mut nodes: Vec<(Site, u32)> = Vec::new();
-    for column in columns {
-        let mut node = |row, class| nodes.extend(Option::map(class, |class| ([column, row], class)));
-        patterns.column(fine, column, |_| false, &mut node);
-    }
-    let patterns: Vec<&[u32]> = patterns.iter().collect();
-    let name = |class: &u32| fine.names.get(*class as usize).copied().unwrap_or_default();
-    let names = patterns.iter().map(|pattern| name_of(pattern.iter().flat_map(name))).collect();
-    let rows = Rows::joined(rows_of(fine, &Parents::new(transfer.steps), &patterns));
-    let columns = Columns::with_step(STEP, nodes.iter().map(|&(site, _)| site), |_| true);
-    Matrix::uncompiled(columns, nodes.into_iter().map(|(_, class)| class).collect(), (rows, names))
+    let columns = Columns::with_step(STEP, nodes.iter().map(|&(site, _)| site));
+    let class = nodes.into_iter().map(|(_, class)| class).collect();
+    Matrix::uncompiled(columns, class, (Rows::joined(pieces), names))
 }
 
 /// The rows of nodes with these surroundings, piece by piece.
@@ -108,11 +126,9 @@ fn rows_of(fine: &Matrix, parents: &Parents, patterns: &[&[u32]]) -> Vec<Rows> {
 
 /// The nodes around the particles that stand at no site.
 struct OutlierParents {
-    /// Index of the first of these particles.
-    first: usize,
-    /// Nodes and shares of each; those that are held have a share in none. Shape \[outliers\].
+    /// Nodes and shares, by the rows of these particles in their column.
     nodes: Vec<[(Site, f64); 4]>,
-    /// The same by nodes, ascending.
+    /// The same by nodes, of those that follow here, ascending.
     children: Vec<Child>,
 }
 
@@ -121,41 +137,29 @@ struct OutlierParents {
 struct Child {
     node: Site,
     particle: usize,
+    /// Of the particle in its column.
+    row: i32,
     share: f64,
 }
 
 impl OutlierParents {
     fn new(fine: &Matrix, steps: [i32; 2]) -> Self {
-        let Outliers { first, ref places } = fine.outliers;
-        let follows = |k: usize| fine.class[first + k] != HELD;
-        let of_place = |(k, &place): (usize, &[f64; 2])| {
-            let nodes = parents_of_place(place, steps);
-            if follows(k) { nodes } else { nodes.map(|(node, _)| (node, 0.0)) }
-        };
-        let nodes: Vec<_> = places.iter().enumerate().map(of_place).collect();
-        let all = (first..).zip(&nodes).flat_map(|(particle, nodes)| {
-            nodes.iter().map(move |&(node, share)| Child { node, particle, share })
+        let places = fine.outliers.places().iter();
+        let nodes: Vec<_> = places.map(|&place| parents_of_place(place, steps)).collect();
+        let all = fine.columns.along().flat_map(|(row, particle)| {
+            nodes[row as usize].iter().map(move |&(node, share)| Child { node, particle, row, share })
         });
         let mut children: Vec<Child> = all.filter(|child| child.share > 0.0).collect();
         children.sort_unstable_by_key(|child| (child.node, child.particle));
-        Self { first, nodes, children }
+        Self { nodes, children }
     }
 
-    /// The same by the numbers of the nodes, which ascend and hold every parent.
-    fn shares(&self, nodes: &[(Site, u32)]) -> OutlierShares {
-        let mut parents = vec![[(0, 0.0); 4]; self.nodes.len()];
-        let mut number = 0;
-        let children = self.children.iter().map(|&Child { node, particle, share }| {
-            while nodes[number].0 != node {
-                number += 1;
-            }
-            let of_particle: &mut [(u32, f32); 4] = &mut parents[particle - self.first];
-            let free = of_particle.iter_mut().find(|(_, share)| *share == 0.0);
-            *free.expect("four at most") = (number as u32, share as f32);
-            (number as u32, particle as u32, share as f32)
-        });
-        let children = children.collect();
-        OutlierShares { first: self.first, parents, children }
+    /// The same by the indices of the nodes that are here.
+    fn shares(&self, nodes: &Columns) -> OutlierShares {
+        let share = |&Child { node, particle, share, .. }: &Child| {
+            nodes.find(node).map(|(node, _)| (node as u32, particle as u32, share as f32))
+        };
+        OutlierShares::new(self.children.iter().filter_map(share).collect())
     }
 }
 
@@ -181,7 +185,7 @@ struct Halves<'a> {
     /// Rows one after the other, by nodes: those that were asked for in this coarse column, and in the one before, lie in turn
     /// in either list. Later ones do not ask for them again, or if they do they are computed anew.
     lists: [Vec<(Site, Block)>; 2],
-    /// Where that of each particle lies, shape \[count\]; empty where there are no particles at no site.
+    /// Where that of each particle lies, shape \[count\].
     of_particle: Vec<Half>,
     /// The column that is being summed.
     column: i32,
@@ -191,13 +195,12 @@ struct Halves<'a> {
 
 impl<'a> Halves<'a> {
     fn new(fine: &'a Matrix, parents: &'a Parents, of_outliers: &'a OutlierParents) -> Self {
-        let count = if of_outliers.nodes.is_empty() { 0 } else { fine.count() };
         Self {
             fine,
             parents,
             of_outliers,
             lists: Default::default(),
-            of_particle: vec![Half::default(); count],
+            of_particle: vec![Half::default(); fine.count()],
             column: i32::MIN,
             sums: Sums::default(),
         }
@@ -210,7 +213,6 @@ impl<'a> Halves<'a> {
             self.lists[parity(node[0])].clear();
         }
         let [across, along] = self.parents.steps;
-        let (first, step) = (self.of_outliers.first, self.fine.columns.step());
         let near = |k: usize, step: i32| node[k] * step - step + 1..node[k] * step + step;
         for column in near(0, across) {
             for row in near(1, along) {
@@ -220,9 +222,8 @@ impl<'a> Halves<'a> {
                 self.add_half(node, [column, row], (i, share), sums);
             }
         }
-        for &Child { particle, share, .. } in outliers {
-            let site = [Body::ALONG_OUTLINE, (particle - first) as i32 * step];
-            self.add_half(node, site, (particle, share), sums);
+        for &Child { particle, row, share, .. } in outliers {
+            self.add_half(node, [Body::ALONG_OUTLINE, row], (particle, share), sums);
         }
     }
 
@@ -262,7 +263,7 @@ impl<'a> Halves<'a> {
             let (node, shares) = self.parents.around(from_near, sign);
             return sums.add_around(node, shares, block);
         }
-        let nodes = &self.of_outliers.nodes[(site[1] / self.fine.columns.step()) as usize];
+        let nodes = &self.of_outliers.nodes[site[1] as usize];
         let first = nodes[0].0;
         sums.add_around(
             [first[0] - near[0], first[1] - near[1]],
@@ -288,7 +289,7 @@ impl Patterns {
     fn new(fine: &Matrix, transfer: Transfer) -> Self {
         let width = 2 * transfer.steps[0] as usize - 1;
         let leads = |row: RowRef<'_>| row.entries.iter().any(|(offset, _)| leads_to_outlier(*offset));
-        let rows = if fine.outliers.places.is_empty() { 0 } else { fine.rows.len() };
+        let rows = if fine.outliers.is_empty() { 0 } else { fine.rows.len() };
         Self {
             transfer,
             known: HashMap::new(),

@@ -38,15 +38,14 @@ impl Plan {
     fn new(matrix: &Matrix) -> Self {
         let mut nodes: Vec<(Site, u32)> = sites(matrix);
         let [across, along] = matrix.columns.extent();
-        if matrix.outliers.places.is_empty() {
+        if matrix.outliers.is_empty() {
             if across < along {
                 nodes.sort_unstable_by_key(|&([column, row], _)| [row, column]);
             }
         } else {
             // Particles along an outline belong among those beside them.
-            let place = |&(site, node): &(Site, u32)| {
-                let outlier = (node as usize).checked_sub(matrix.outliers.first);
-                let [i, j] = outlier.map_or(site.map(f64::from), |k| matrix.outliers.places[k]);
+            let place = |&(site, _): &(Site, u32)| {
+                let [i, j] = matrix.outliers.place(site);
                 if across < along { [j, i] } else { [i, j] }
             };
             nodes.sort_by(|a, b| {

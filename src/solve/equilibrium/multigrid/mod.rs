@@ -12,7 +12,7 @@
 //! * The coarsest level is solved outright (`envelope`).
 //! * Ranks share each level by groups of its columns. Where these become few, the first rank does what is left of the
 //!   way down and back up, and the others wait for it: it would take less time than their exchanges. Of a level that they share
-//!   each has the columns that it needs (`windows`), unless the body has particles at no site: then each has all of them.
+//!   each has the columns that it needs (`windows`).
 //!
 //! The cycle runs in single precision: it begins at zero and its result is only a direction, so what
 //! rounding does to it costs no digit of the equilibrium; the iteration around it runs in double precision.
@@ -103,11 +103,13 @@ struct Transfers {
 }
 
 impl Transfers {
-    fn new([fine, coarse]: [(&Part, &Matrix); 2], transfer: Transfer, outliers: &OutlierShares) -> Self {
+    fn new([fine, coarse]: [(&Part, &Matrix); 2], transfer: Transfer) -> Self {
         let (team, levels) = (fine.0.team.clone(), (fine.1, coarse.1));
         let [fine, coarse] = [&fine.0.cuts, &coarse.0.cuts];
-        let read_down = |rank: usize| transfer.restricted_from(levels, outliers, &coarse.groups_of(rank));
-        let read_up = |rank: usize| transfer.prolonged_from(levels, outliers, &fine.groups_of(rank));
+        let read_down = |rank: usize| transfer.restricted_from(levels, &coarse.groups_of(rank));
+        let read_up = |rank: usize| transfer.prolonged_from(levels, &fine.groups_of(rank));
+        let read_down = |rank: usize| Vec::from_iter(read_down(rank));
+        let read_up = |rank: usize| Vec::from_iter(read_up(rank));
         let rank = team.rank();
         let (down, up) = (Halo::new(rank, fine, read_down), Halo::new(rank, coarse, read_up));
         Self { team, down: down.here(levels.0.first()), up: up.here(levels.1.first()) }
@@ -199,7 +201,7 @@ impl<'a> Cycle<'a> {
             descent.go(transfer);
             self.levels.push(level);
         }
-        let coarsest = Envelope::new(self.coarsest_matrix(), scale, !self.matrix.outliers.places.is_empty());
+        let coarsest = Envelope::new(self.coarsest_matrix(), scale, !self.matrix.outliers.is_empty());
         self.coarsest = Some(coarsest.ok_or(NOT_POSITIVE)?);
         Ok(())
     }
@@ -226,7 +228,7 @@ fn descend(
         (smoothers.split_first(), below.split_first_mut())
     else {
         // Of levels that are left to the first rank the others have nothing.
-        coarsest.into_iter().for_each(|coarsest| solve_coarsest(matrix, coarsest, f, v));
+        coarsest.into_iter().for_each(|coarsest| coarsest.solve((&f.x, &f.y), (&mut v.x, &mut v.y)));
         return;
     };
     steps::precondition(matrix, stencils, (0.0, weights[0]), f, u);
@@ -250,37 +252,21 @@ fn descend(
     steps::smooth(matrix, stencils, weights[0], (u, f), v);
 }
 
-/// Each rank that owns some of the coarsest level solves it; hardly ever is it more than the first one.
-fn solve_coarsest(matrix: &Matrix, coarsest: &mut Envelope, f: &mut Vectors<f32>, v: &mut Vectors<f32>) {
-    if matrix.part.as_ref().is_some_and(|part| part.is_shared()) {
-        matrix.gather(f);
-    }
-    if !matrix.own_groups().is_empty() {
-        coarsest.solve((&f.x, &f.y), (&mut v.x, &mut v.y));
-    }
-}
-
 impl Level {
+    /// Of a grid that one rank has whole.
     fn new(fine: &Matrix, transfer: Transfer) -> Self {
-        let (mut matrix, outliers) = coarsen::coarsen(fine, transfer);
-        // What one rank has alone it needs not share.
-        let part = fine.part.as_ref().filter(|_| fine.window.is_none());
-        matrix.part = part.map(|part| Arc::new(Part::new(&part.team, &matrix)));
-        Self::below(fine, Arc::new(matrix), transfer, outliers)
+        let (matrix, outliers) = coarsen::coarsen(fine, transfer);
+        let vectors = LevelVectors::new(matrix.count());
+        Self { transfer, outliers, matrix: Arc::new(matrix), vectors, transfers: None }
     }
 
     /// The same of a level that is set up.
     fn in_window(fine: &Matrix, coarse: &Arc<Matrix>, transfer: Transfer) -> Self {
-        let outliers = OutlierShares { first: usize::MAX, ..OutlierShares::default() };
-        Self::below(fine, coarse.clone(), transfer, outliers)
-    }
-
-    fn below(fine: &Matrix, matrix: Arc<Matrix>, transfer: Transfer, outliers: OutlierShares) -> Self {
-        let parts = fine.part.as_deref().zip(matrix.part.as_deref());
-        let transfers =
-            parts.map(|(above, here)| Transfers::new([(above, fine), (here, &*matrix)], transfer, &outliers));
-        let vectors = LevelVectors::new(matrix.count());
-        Self { transfer, outliers, matrix, vectors, transfers }
+        let outliers = coarsen::outlier_shares(fine, transfer, coarse);
+        let parts = fine.part.as_deref().zip(coarse.part.as_deref());
+        let transfers = parts.map(|(above, here)| Transfers::new([(above, fine), (here, coarse)], transfer));
+        let vectors = LevelVectors::new(coarse.count());
+        Self { transfer, outliers, matrix: coarse.clone(), vectors, transfers }
     }
 }
 

@@ -115,9 +115,7 @@ fn the_coarse_space_contains_translations_rotations_and_uniform_strains() {
         transfer.prolong((fine, coarse), shares, &nodes, &mut found);
         for site in fine.columns.sites() {
             let (i, _) = fine.columns.find(site).expect("a follower");
-            let outlier = i.checked_sub(fine.outliers.first);
-            let place = outlier.map_or(site.map(f64::from), |k| fine.outliers.places[k]);
-            let (found, expected) = (found.get(i), affine(place));
+            let (found, expected) = (found.get(i), affine(fine.outliers.place(site)));
             let error = (0..2).map(|k| (f64::from(found[k]) - expected[k]).abs()).fold(0.0, f64::max);
             assert!(error < 1e-5, "{kind:?} {transfer:?} {site:?}: {error}");
         }

@@ -10,7 +10,7 @@ use crate::flock::lattice::Site;
 use crate::flock::vectors::Vectors;
 use crate::solve::equilibrium::steps::for_own_groups;
 use crate::solve::field::{VectorsMut, VectorsRef};
-use crate::solve::operator::{Columns, Matrix, Segment};
+use crate::solve::operator::{Columns, Matrix, Outliers, Segment};
 
 /// Between the particles of one matrix and the nodes of the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,48 +66,30 @@ impl Column {
 /// Shares of the particles along an outline, which stand at no site, in the coarse nodes around their places.
 #[derive(Clone, Debug, Default)]
 pub struct OutlierShares {
-    /// Index of the first of them in the fine matrix.
-    pub first: usize,
-    /// Nodes and shares of each, those of no share last, shape \[outliers\].
-    pub parents: Vec<[(u32, f32); 4]>,
-    /// The same by nodes: node, particle, share; ascending.
-    pub children: Vec<(u32, u32, f32)>,
+    /// Node, particle, share; ascending.
+    by_node: Vec<(u32, u32, f32)>,
+    /// Particle, node, share; ascending.
+    by_particle: Vec<(u32, u32, f32)>,
 }
 
 impl OutlierShares {
-    fn restrict(&self, from: &Vectors<f32>, to: &mut VectorsMut<'_, f32>) {
-        let range = to.range();
-        let begin = self.children.partition_point(|&(node, ..)| (node as usize) < range.start);
-        let of_range = self.children[begin..].iter().take_while(|(node, ..)| (*node as usize) < range.end);
-        for &(node, particle, share) in of_range {
-            let at = node as usize - range.start;
-            to.x[at] += share * from.x[particle as usize];
-            to.y[at] += share * from.y[particle as usize];
-        }
+    /// From nodes, particles and shares, ascending.
+    pub fn new(by_node: Vec<(u32, u32, f32)>) -> Self {
+        let turned = by_node.iter().map(|&(node, particle, share)| (particle, node, share));
+        let mut by_particle: Vec<_> = turned.collect();
+        by_particle.sort_unstable_by_key(|&(particle, node, _)| (particle, node));
+        Self { by_node, by_particle }
     }
+}
 
-    /// The particles that have a share in one of these nodes.
-    fn restricted_from(&self, nodes: &Range<usize>) -> impl Iterator<Item = usize> {
-        let has = |(node, ..): &&(u32, u32, f32)| nodes.contains(&(*node as usize));
-        self.children.iter().filter(has).map(|&(_, particle, _)| particle as usize)
-    }
-
-    /// The nodes that these particles have a share in; the first one, with no share, beside them where they are fewer than
-    /// four.
-    fn prolonged_from(&self, particles: &Range<usize>) -> impl Iterator<Item = usize> {
-        let outliers = particles.start.max(self.first)..particles.end.max(self.first);
-        let parents = outliers.filter_map(|i| self.parents.get(i - self.first));
-        parents.flatten().map(|&(node, _)| node as usize)
-    }
-
-    fn prolong(&self, from: &Vectors<f32>, to: &mut VectorsMut<'_, f32>) {
-        let range = to.range();
-        for i in range.start.max(self.first)..range.end {
-            for &(node, share) in self.parents.get(i - self.first).into_iter().flatten() {
-                to.x[i - range.start] += share * from.x[node as usize];
-                to.y[i - range.start] += share * from.y[node as usize];
-            }
-        }
+/// Adds shares, listed by what they are added to.
+fn add_shares(shares: &[(u32, u32, f32)], from: &Vectors<f32>, to: &mut VectorsMut<'_, f32>) {
+    let range = to.range();
+    let begin = shares.partition_point(|&(at, ..)| (at as usize) < range.start);
+    for &(at, other, share) in shares[begin..].iter().take_while(|(at, ..)| (*at as usize) < range.end) {
+        let at = at as usize - range.start;
+        to.x[at] += share * from.x[other as usize];
+        to.y[at] += share * from.y[other as usize];
     }
 }
 
@@ -149,50 +131,42 @@ impl Transfer {
                     self.contract(segment, &column, &mut to);
                 }
             }
-            outliers.restrict(from, &mut to);
+            add_shares(&outliers.by_node, from, &mut to);
         });
     }
 
     /// Columns of the fine grid that have a share in these of the coarse one.
-    pub fn columns_below(self, coarse: &Range<i32>) -> Range<i32> {
-        let across = self.steps[0];
-        coarse.start * across - across + 1..(coarse.end - 1) * across + across
+    pub fn columns_below(self, coarse: &Range<i32>, outliers: &Outliers) -> Range<i32> {
+        let (across, beside) = (self.steps[0], outliers.beside());
+        coarse.start * across - across + 1 - beside..(coarse.end - 1) * across + across + beside
     }
 
     /// Columns of the coarse grid that have a share in these of the fine one.
-    pub fn columns_above(self, fine: &Range<i32>) -> Range<i32> {
-        let across = self.steps[0];
-        fine.start.div_euclid(across)..(fine.end - 1).div_euclid(across) + 2
+    pub fn columns_above(self, fine: &Range<i32>, outliers: &Outliers) -> Range<i32> {
+        let (across, beside) = (self.steps[0], outliers.beside());
+        (fine.start - beside).div_euclid(across)..(fine.end - 1 + beside).div_euclid(across) + 2
     }
 
     /// What [`Transfer::restrict`] to these groups of nodes reads of the fine particles.
     pub fn restricted_from(
         self,
         (fine, coarse): (&Matrix, &Matrix),
-        outliers: &OutlierShares,
         groups: &Range<usize>,
-    ) -> Vec<Range<usize>> {
+    ) -> Option<Range<usize>> {
         let [first, end] = [groups.start, groups.end].map(|group| coarse.group_columns[group]);
-        let columns = self.columns_below(&(first..end));
-        let nodes = coarse.bounds[groups.start]..coarse.bounds[groups.end];
-        let one = |i: usize| i..i + 1;
-        let of_columns = Some(fine.particles_of(columns)).filter(|_| first < end);
-        of_columns.into_iter().chain(outliers.restricted_from(&nodes).map(one)).collect()
+        let columns = || self.columns_below(&(first..end), &fine.outliers);
+        (first < end).then(|| fine.particles_of(columns()))
     }
 
     /// What [`Transfer::prolong`] to these groups of particles reads of the coarse nodes.
     pub fn prolonged_from(
         self,
         (fine, coarse): (&Matrix, &Matrix),
-        outliers: &OutlierShares,
         groups: &Range<usize>,
-    ) -> Vec<Range<usize>> {
+    ) -> Option<Range<usize>> {
         let [first, end] = [groups.start, groups.end].map(|group| fine.group_columns[group]);
-        let columns = self.columns_above(&(first..end));
-        let particles = fine.bounds[groups.start]..fine.bounds[groups.end];
-        let one = |i: usize| i..i + 1;
-        let of_columns = Some(coarse.particles_of(columns)).filter(|_| first < end);
-        of_columns.into_iter().chain(outliers.prolonged_from(&particles).map(one)).collect()
+        let columns = || self.columns_above(&(first..end), &fine.outliers);
+        (first < end).then(|| coarse.particles_of(columns()))
     }
 
     /// The fine columns that have a share in a coarse one, weighted and added up row by row.
@@ -265,7 +239,7 @@ impl Transfer {
                     self.expand(segment, fine.columns.step(), &column, &mut to);
                 }
             }
-            outliers.prolong(from, &mut to);
+            add_shares(&outliers.by_particle, from, &mut to);
         });
     }
 

@@ -2,19 +2,22 @@
 
 use std::ops::Range;
 
+use crate::flock::body::Body;
 use crate::flock::lattice::{LatticeKind, Site};
 use crate::flock::vectors::Vectors;
 use crate::ranks::{Team, in_process};
 use crate::solve::equilibrium::{
     Choice, Precision, Request, SolveError, Solved, Solver, System, solve_shared,
 };
-use crate::solve::operator::samples::operator;
-use crate::solve::operator::{Matrix, Operator, Row, SIZE};
+use crate::solve::operator::samples::{operator, with_outliers};
+use crate::solve::operator::{Matrix, Operator, Outliers, Row, SIZE};
 use crate::solve::shared::SystemPart;
 
 /// A body, whole or in parts.
 struct Sample {
     sites: Vec<Site>,
+    /// Column of each particle.
+    column: Vec<i32>,
     operator: Operator,
     forces: Vectors,
     held: Vectors,
@@ -27,12 +30,22 @@ fn noise(k: usize) -> f64 {
 
 impl Sample {
     fn new(kind: LatticeKind, [columns, rows]: [u32; 2], is_held: impl Fn(usize) -> bool) -> Self {
-        let operator = operator(kind, columns, rows, is_held);
+        Self::of(operator(kind, columns, rows, is_held))
+    }
+
+    /// The same with some of the particles along an outline.
+    fn with_outliers(kind: LatticeKind, size: [u32; 2], is_held: impl Fn(usize) -> bool) -> Self {
+        Self::of(with_outliers(&operator(kind, size[0], size[1], is_held)))
+    }
+
+    fn of(operator: Operator) -> Self {
         let count = operator.count();
+        let sites: Vec<Site> = operator.columns.sites().collect();
         let field =
             |from: usize| (0..count).map(|i| [noise(from + 2 * i), noise(from + 2 * i + 1)]).collect();
         Self {
-            sites: operator.columns.sites().collect(),
+            column: sites.iter().map(|&site| operator.outliers.column(site)).collect(),
+            sites,
             forces: field(7),
             held: field(1000),
             held_axes: (0..count).map(|i| [i % 53 == 11, i % 61 == 5]).collect(),
@@ -45,24 +58,32 @@ impl Sample {
         let of = self.particles(&columns);
         let row = |i: usize| {
             let (i, Row { diagonal, mut entries }) = (of.start + i, self.operator.row(of.start + i));
-            entries.retain(|(offset, _)| columns.contains(&(self.sites[i][0] + offset[0])));
+            entries.retain(|(offset, _)| {
+                let there = self.operator.index_of(self.sites[i], *offset);
+                columns.contains(&self.column[there])
+            });
             Row { diagonal, entries }
         };
         let follows = self.operator.follows()[of.clone()].to_vec();
         let sites = &self.sites[of.clone()];
-        let operator = Operator::from_rows(sites, self.operator.grid, follows, row).expect("an operator");
+        // A part has the places of those that stand in it.
+        let along = sites.iter().filter(|site| site[0] == Body::ALONG_OUTLINE);
+        let outliers = Outliers::new(along.map(|&site| (site[1], self.operator.outliers.place(site))));
+        let grid = self.operator.grid;
+        let operator = Operator::from_rows_along_outline((sites, outliers), grid, follows, row);
+        let operator = operator.expect("an operator");
         let slice = |of_all: &Vectors| of.clone().map(|i| of_all.get(i)).collect();
         let operator = operator.with_held_axes(self.held_axes[of.clone()].to_vec());
         System::new(operator, slice(&self.forces), slice(&self.held))
     }
 
     fn particles(&self, columns: &Range<i32>) -> Range<usize> {
-        let begin = |column: i32| self.sites.partition_point(|site| site[0] < column);
+        let begin = |column: i32| self.column.partition_point(|&other| other < column);
         begin(columns.start)..begin(columns.end)
     }
 
     fn all(&self) -> Range<i32> {
-        self.sites[0][0]..self.sites[self.sites.len() - 1][0] + 1
+        self.column[0]..self.column[self.column.len() - 1] + 1
     }
 
     /// The part of a rank, with a few columns on either side.
@@ -134,23 +155,34 @@ fn assert_found_the_same(sample: &Sample, size: u64, request: &Request, what: &s
 #[test]
 fn parts_of_a_system_have_the_bits_of_the_whole_on_every_lattice() {
     for kind in LatticeKind::SAMPLES {
-        let sample = Sample::new(kind, [67, 41], |i| i < 60 || i % 211 == 5);
-        for (solver, size) in [
-            (Solver::ConjugateGradients, 90),
-            (Solver::Multigrid, 90),
-            (Solver::Multigrid, 300),
-            // Left to the first rank.
-            (Solver::Multigrid, 2000),
-            (Solver::Direct, 300),
-        ] {
-            let request = Request { solver: Choice::This(solver), tolerance: 1e-8, ..Request::default() };
-            assert_found_the_same(&sample, size, &request, &format!("{kind:?} {solver} {size}"));
-        }
-        for solver in [Solver::ConjugateGradients, Solver::Multigrid] {
-            let request = Request { solver: Choice::This(solver), tolerance: 1e-4, ..Request::default() };
-            let request = Request { precision: Precision::F32, ..request };
-            assert_found_the_same(&sample, 90, &request, &format!("{kind:?} {solver} in single precision"));
-        }
+        assert_parts_have_the_bits_of(&Sample::new(kind, [67, 41], |i| i < 60 || i % 211 == 5), kind);
+    }
+}
+
+#[test]
+fn so_have_parts_of_one_with_particles_along_an_outline() {
+    for kind in LatticeKind::SAMPLES {
+        let sample = Sample::with_outliers(kind, [67, 41], |i| i < 60 || i % 211 == 5);
+        assert_parts_have_the_bits_of(&sample, kind);
+    }
+}
+
+fn assert_parts_have_the_bits_of(sample: &Sample, kind: LatticeKind) {
+    for (solver, size) in [
+        (Solver::ConjugateGradients, 90),
+        (Solver::Multigrid, 90),
+        (Solver::Multigrid, 300),
+        // Left to the first rank.
+        (Solver::Multigrid, 2000),
+        (Solver::Direct, 300),
+    ] {
+        let request = Request { solver: Choice::This(solver), tolerance: 1e-8, ..Request::default() };
+        assert_found_the_same(sample, size, &request, &format!("{kind:?} {solver} {size}"));
+    }
+    for solver in [Solver::ConjugateGradients, Solver::Multigrid] {
+        let request = Request { solver: Choice::This(solver), tolerance: 1e-4, ..Request::default() };
+        let request = Request { precision: Precision::F32, ..request };
+        assert_found_the_same(sample, 90, &request, &format!("{kind:?} {solver} in single precision"));
     }
 }
 
@@ -172,6 +204,10 @@ fn what_ranks_refuse_together_is_what_one_refuses_alone() {
             *sample = Sample::new(kind, [40, 11], |_| false);
             sample.held_axes.fill([false; 2]);
         }),
+        of(&|sample| {
+            *sample = Sample::with_outliers(kind, [40, 11], |i| i < 9);
+            sample.forces.x[333] = f64::NAN;
+        }),
     ];
     for (k, sample) in samples.iter().enumerate() {
         assert_found_the_same(sample, 40, &request, &format!("{k}"));
@@ -181,7 +217,7 @@ fn what_ranks_refuse_together_is_what_one_refuses_alone() {
 #[test]
 fn what_columns_cost_is_what_their_runs_cost() {
     for kind in LatticeKind::SAMPLES {
-        let sample = Sample::new(kind, [67, 41], |i| i < 60 || i % 211 == 5);
+        let sample = Sample::with_outliers(kind, [67, 41], |i| i < 60 || i % 211 == 5);
         let bounds = on_ranks(1, 90, |team| {
             let matrix = Matrix::of_followers(&sample.columns(sample.all()).operator);
             let (bounds, columns) = (matrix.bounds.clone(), matrix.group_columns.clone());
