@@ -77,33 +77,28 @@ impl Cuts {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Halo {
     /// To each rank that reads some of this one's.
-    sends: Vec<(usize, Vec<Range<usize>>)>,
+    sends: Vec<(usize, Range<usize>)>,
     /// From each rank that owns some of what this one reads.
-    receives: Vec<(usize, Vec<Range<usize>>)>,
+    receives: Vec<(usize, Range<usize>)>,
 }
 
 impl Halo {
-    /// The halo of a rank; `read_by` are the particles that a rank reads, in any order and its own among them.
-    pub fn new(rank: usize, owned: &Cuts, read_by: impl Fn(usize) -> Vec<Range<usize>>) -> Self {
-        let mut halo = Self::default();
-        let read_here = joined(read_by(rank));
-        for other in (0..owned.ranks()).filter(|&other| other != rank) {
-            let received = within(&read_here, &owned.particles_of(other));
-            if !received.is_empty() {
-                halo.receives.push((other, received));
-            }
-            let sent = within(&joined(read_by(other)), &owned.particles_of(rank));
-            if !sent.is_empty() {
-                halo.sends.push((other, sent));
-            }
-        }
-        halo
+    /// The halo of a rank; `read_by` are the particles that a rank reads, which may be its own.
+    pub fn new(rank: usize, owned: &Cuts, read_by: impl Fn(usize) -> Range<usize>) -> Self {
+        let both = |owner: usize, reader: usize| {
+            let (owned, read) = (owned.particles_of(owner), read_by(reader));
+            Some(owned.start.max(read.start)..owned.end.min(read.end)).filter(|both| !both.is_empty())
+        };
+        let others = || (0..owned.ranks()).filter(|&other| other != rank);
+        let sends = others().filter_map(|other| Some((other, both(rank, other)?))).collect();
+        let receives = others().filter_map(|other| Some((other, both(other, rank)?))).collect();
+        Self { sends, receives }
     }
 
     /// The same where the first particle here is this one of the whole.
     pub fn here(mut self, first: usize) -> Self {
-        let of_ranks = self.sends.iter_mut().chain(&mut self.receives).flat_map(|(_, of)| of);
-        of_ranks.for_each(|range| *range = range.start - first..range.end - first);
+        let of_ranks = self.sends.iter_mut().chain(&mut self.receives);
+        of_ranks.for_each(|(_, of)| *of = of.start - first..of.end - first);
         self
     }
 
@@ -114,7 +109,7 @@ impl Halo {
         }
         let sent: Vec<_> = self.sends.iter().map(|(rank, of)| (*rank, words(v, of))).collect();
         let sizes: Vec<_> =
-            self.receives.iter().map(|(rank, of)| (*rank, words_per_particle::<T>() * count(of))).collect();
+            self.receives.iter().map(|(rank, of)| (*rank, words_per_particle::<T>() * of.len())).collect();
         for ((_, of), words) in self.receives.iter().zip(team.swap(&sent, &sizes)) {
             put(v, of, &words);
         }
@@ -135,7 +130,7 @@ pub struct Part {
 impl Part {
     /// The part of this rank in a window that begins with the `first` particle of the whole; `read_by` are all that a rank reads.
     pub fn in_window(team: &Team, cuts: Cuts, first: usize, read_by: impl Fn(usize) -> Range<usize>) -> Self {
-        let halo = Halo::new(team.rank(), &cuts, |rank| vec![read_by(rank)]).here(first);
+        let halo = Halo::new(team.rank(), &cuts, read_by).here(first);
         Self { team: team.clone(), cuts, halo }
     }
 
@@ -185,62 +180,30 @@ fn read_by(matrix: &Matrix, cuts: &Cuts, rank: usize) -> Range<usize> {
     if groups.is_empty() { 0..0 } else { matrix.columns.particles(first - reach..end + reach) }
 }
 
-/// Ascending and apart from each other.
-fn joined(mut ranges: Vec<Range<usize>>) -> Vec<Range<usize>> {
-    ranges.sort_unstable_by_key(|range| range.start);
-    let mut joined: Vec<Range<usize>> = Vec::new();
-    for range in ranges.into_iter().filter(|range| !range.is_empty()) {
-        match joined.last_mut() {
-            Some(last) if range.start <= last.end => last.end = last.end.max(range.end),
-            _ => joined.push(range),
-        }
-    }
-    joined
-}
-
-/// What of the ranges lies in another one.
-fn within(ranges: &[Range<usize>], of: &Range<usize>) -> Vec<Range<usize>> {
-    let cut = ranges.iter().map(|range| range.start.max(of.start)..range.end.min(of.end));
-    cut.filter(|range| !range.is_empty()).collect()
-}
-
-fn count(of: &[Range<usize>]) -> usize {
-    of.iter().map(ExactSizeIterator::len).sum()
-}
-
 /// Both components of single precision go into one word.
 const fn words_per_particle<T>() -> usize {
     if size_of::<T>() == size_of::<f32>() { 1 } else { 2 }
 }
 
-fn words<T: Real>(v: &Vectors<T>, of: &[Range<usize>]) -> Vec<u64> {
-    let mut words = Vec::with_capacity(words_per_particle::<T>() * count(of));
-    for range in of {
-        let (x, y) = (&v.x[range.clone()], &v.y[range.clone()]);
-        if words_per_particle::<T>() == 1 {
-            words.extend(x.iter().zip(y).map(|(x, y)| x.bits() | y.bits() << 32));
-        } else {
-            words.extend(x.iter().chain(y).map(|value| value.bits()));
-        }
+fn words<T: Real>(v: &Vectors<T>, of: &Range<usize>) -> Vec<u64> {
+    let (x, y) = (&v.x[of.clone()], &v.y[of.clone()]);
+    if words_per_particle::<T>() == 1 {
+        x.iter().zip(y).map(|(x, y)| x.bits() | y.bits() << 32).collect()
+    } else {
+        x.iter().chain(y).map(|value| value.bits()).collect()
     }
-    words
 }
 
-fn put<T: Real>(v: &mut Vectors<T>, of: &[Range<usize>], words: &[u64]) {
-    let mut rest = words;
-    for range in of {
-        let (of_range, after) = rest.split_at(words_per_particle::<T>() * range.len());
-        let (x, y) = (&mut v.x[range.clone()], &mut v.y[range.clone()]);
-        if words_per_particle::<T>() == 1 {
-            for ((x, y), word) in x.iter_mut().zip(y).zip(of_range) {
-                (*x, *y) = (T::of_bits(word & u64::from(u32::MAX)), T::of_bits(word >> 32));
-            }
-        } else {
-            let (of_x, of_y) = of_range.split_at(range.len());
-            x.iter_mut().zip(of_x).for_each(|(x, &bits)| *x = T::of_bits(bits));
-            y.iter_mut().zip(of_y).for_each(|(y, &bits)| *y = T::of_bits(bits));
+fn put<T: Real>(v: &mut Vectors<T>, of: &Range<usize>, words: &[u64]) {
+    let (x, y) = (&mut v.x[of.clone()], &mut v.y[of.clone()]);
+    if words_per_particle::<T>() == 1 {
+        for ((x, y), word) in x.iter_mut().zip(y).zip(words) {
+            (*x, *y) = (T::of_bits(word & u64::from(u32::MAX)), T::of_bits(word >> 32));
         }
-        rest = after;
+    } else {
+        let (of_x, of_y) = words.split_at(of.len());
+        x.iter_mut().zip(of_x).for_each(|(x, &bits)| *x = T::of_bits(bits));
+        y.iter_mut().zip(of_y).for_each(|(y, &bits)| *y = T::of_bits(bits));
     }
 }
 
@@ -299,11 +262,11 @@ mod tests {
                     let mut known = vec![false; matrix.count()];
                     known[part.cuts.particles_of(rank)].fill(true);
                     for (other, of) in &part.halo.receives {
-                        of.iter().for_each(|range| known[range.clone()].fill(true));
+                        known[of.clone()].fill(true);
                         let sent = parts[*other].halo.sends.iter().find(|(to, _)| *to == rank);
                         assert_eq!(sent.map(|(_, of)| of), Some(of));
                     }
-                    let received: usize = part.halo.receives.iter().map(|(_, of)| count(of)).sum();
+                    let received: usize = part.halo.receives.iter().map(|(_, of)| of.len()).sum();
                     assert_eq!(received_by(&matrix, &part.cuts, rank), received);
                     for run in part.groups().flat_map(|group| matrix.runs_of(group)) {
                         for &distance in matrix.distances(run) {

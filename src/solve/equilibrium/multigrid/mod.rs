@@ -108,8 +108,6 @@ impl Transfers {
         let [fine, coarse] = [&fine.0.cuts, &coarse.0.cuts];
         let read_down = |rank: usize| transfer.restricted_from(levels, &coarse.groups_of(rank));
         let read_up = |rank: usize| transfer.prolonged_from(levels, &fine.groups_of(rank));
-        let read_down = |rank: usize| Vec::from_iter(read_down(rank));
-        let read_up = |rank: usize| Vec::from_iter(read_up(rank));
         let rank = team.rank();
         let (down, up) = (Halo::new(rank, fine, read_down), Halo::new(rank, coarse, read_up));
         Self { team, down: down.here(levels.0.first()), up: up.here(levels.1.first()) }
@@ -264,7 +262,8 @@ impl Level {
     fn in_window(fine: &Matrix, coarse: &Arc<Matrix>, transfer: Transfer) -> Self {
         let outliers = coarsen::outlier_shares(fine, transfer, coarse);
         let parts = fine.part.as_deref().zip(coarse.part.as_deref());
-        let transfers = parts.map(|(above, here)| Transfers::new([(above, fine), (here, coarse)], transfer));
+        let transfers =
+            parts.map(|(above, here)| Transfers::new([(above, fine), (here, &**coarse)], transfer));
         let vectors = LevelVectors::new(coarse.count());
         Self { transfer, outliers, matrix: coarse.clone(), vectors, transfers }
     }

@@ -148,25 +148,17 @@ impl Transfer {
     }
 
     /// What [`Transfer::restrict`] to these groups of nodes reads of the fine particles.
-    pub fn restricted_from(
-        self,
-        (fine, coarse): (&Matrix, &Matrix),
-        groups: &Range<usize>,
-    ) -> Option<Range<usize>> {
+    pub fn restricted_from(self, (fine, coarse): (&Matrix, &Matrix), groups: &Range<usize>) -> Range<usize> {
         let [first, end] = [groups.start, groups.end].map(|group| coarse.group_columns[group]);
         let columns = || self.columns_below(&(first..end), &fine.outliers);
-        (first < end).then(|| fine.particles_of(columns()))
+        if first < end { fine.particles_of(columns()) } else { 0..0 }
     }
 
     /// What [`Transfer::prolong`] to these groups of particles reads of the coarse nodes.
-    pub fn prolonged_from(
-        self,
-        (fine, coarse): (&Matrix, &Matrix),
-        groups: &Range<usize>,
-    ) -> Option<Range<usize>> {
+    pub fn prolonged_from(self, (fine, coarse): (&Matrix, &Matrix), groups: &Range<usize>) -> Range<usize> {
         let [first, end] = [groups.start, groups.end].map(|group| fine.group_columns[group]);
         let columns = || self.columns_above(&(first..end), &fine.outliers);
-        (first < end).then(|| coarse.particles_of(columns()))
+        if first < end { coarse.particles_of(columns()) } else { 0..0 }
     }
 
     /// The fine columns that have a share in a coarse one, weighted and added up row by row.
