@@ -1,6 +1,6 @@
 //! The operator compiled is the operator given.
 
-use super::samples::operator;
+use super::samples::{operator, with_outliers};
 use super::*;
 use crate::flock::block::apply;
 use crate::flock::lattice::LatticeKind;
@@ -26,27 +26,35 @@ fn noise(count: usize) -> Vectors<f64> {
 #[test]
 fn the_compiled_matrix_is_the_rows_over_the_followers() {
     for kind in LatticeKind::SAMPLES {
-        let operator = operator(kind, 41, 53, |i| i < 30 || i % 97 == 5);
-        let matrix = Matrix::of_followers(&operator);
-        let stencils = RowCoefficients::<f64>::new(&matrix, 2.0);
-        let mut u = noise(operator.count());
-        for i in (0..operator.count()).filter(|&i| !operator.follows()[i]) {
-            (u.x[i], u.y[i]) = (0.0, 0.0);
+        let regular = operator(kind, 41, 53, |i| i < 30 || i % 97 == 5);
+        for operator in [with_outliers(&regular).with_held_axes(Vec::new()), regular] {
+            assert_compiled(&operator, kind);
         }
-        let mut found = Collect { product: Vectors::zeros(operator.count()) };
-        (0..matrix.groups()).for_each(|group| pass(&matrix, &stencils, group, u.view(), &mut found));
-        for (i, site) in operator.columns.sites().enumerate() {
-            let mut expected = [0.0; 2];
-            if operator.follows()[i] {
-                expected = apply(operator.scaled_row(i).diagonal, u.get(i));
-                for (offset, block) in operator.scaled_row(i).entries {
-                    let pull = apply(block, u.get(operator.index_of(site, *offset)));
-                    expected = [expected[0] - pull[0], expected[1] - pull[1]];
-                }
+    }
+}
+
+fn assert_compiled(operator: &Operator, kind: LatticeKind) {
+    let matrix = Matrix::of_followers(operator);
+    let stencils = RowCoefficients::<f64>::new(&matrix, 2.0);
+    let mut u = noise(operator.count());
+    for i in (0..operator.count()).filter(|&i| !operator.follows()[i]) {
+        (u.x[i], u.y[i]) = (0.0, 0.0);
+    }
+    let mut found = Collect { product: Vectors::zeros(operator.count()) };
+    (0..matrix.groups()).for_each(|group| pass(&matrix, &stencils, group, u.view(), &mut found));
+    for (i, site) in operator.columns.sites().enumerate() {
+        assert_eq!(operator.columns.find(site).map(|(found, _)| found), Some(i), "{kind:?} {site:?}");
+        assert_eq!(operator.columns.column_of(i), operator.outliers.column(site), "{kind:?} {site:?}");
+        let mut expected = [0.0; 2];
+        if operator.follows()[i] {
+            expected = apply(operator.scaled_row(i).diagonal, u.get(i));
+            for (offset, block) in operator.scaled_row(i).entries {
+                let pull = apply(block, u.get(operator.index_of(site, *offset)));
+                expected = [expected[0] - pull[0], expected[1] - pull[1]];
             }
-            let found = found.product.get(i);
-            assert!((0..2).all(|k| (found[k] - 2.0 * expected[k]).abs() < 1e-13), "{kind:?} {i}");
         }
+        let found = found.product.get(i);
+        assert!((0..2).all(|k| (found[k] - 2.0 * expected[k]).abs() < 1e-13), "{kind:?} {i}");
     }
 }
 
