@@ -331,7 +331,7 @@ impl Corotated<'_> {
         let (order, follows) = (&self.order, self.order.by_place(self.follows.clone()));
         let (sites, outliers) = order.sites();
         let row = |place: usize| row(order.particle(place));
-        let operator = Operator::from_rows_along_outline((&sites, outliers), grid, follows, row);
+        let operator = Operator::from_rows_along_outline((&sites[..], outliers), grid, follows, row);
         let operator = operator.map_err(|error| order.error(error))?;
         Ok(operator.with_held_axes(order.by_place(self.held_axes.clone())))
     }

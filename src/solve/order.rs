@@ -3,6 +3,8 @@
 //! A body has these after all others. In their columns they are close to what they feel, so that ranks share them as they share
 //! the rest, and a part of a body is laid out in this order already.
 
+use std::borrow::Cow;
+
 use super::equilibrium::System;
 use super::operator::{Operator, OperatorError, Outliers};
 use crate::flock::body::Body;
@@ -53,8 +55,13 @@ impl<'a> Order<'a> {
     }
 
     /// Sites by places, and where the particles are that stand at none.
-    pub fn sites(&self) -> (Vec<Site>, Outliers) {
-        (self.by_place(self.body.sites.clone()), self.outliers.clone())
+    pub fn sites(&self) -> (Cow<'_, [Site]>, Outliers) {
+        let sites = &self.body.sites;
+        let sites = match &self.particles {
+            None => Cow::Borrowed(&sites[..]),
+            Some(particles) => particles.iter().map(|&i| sites[i as usize]).collect(),
+        };
+        (sites, self.outliers.clone())
     }
 
     /// The system of an operator by places, with what is given of each particle.
