@@ -162,7 +162,7 @@ pub(super) fn whole_of_part(part: &SystemPart, matrix: Matrix) -> Matrix {
     let all = shares[0].start..shares[shares.len() - 1].end;
     let Matrix { columns, class, rows, outliers, .. } =
         fetched(team, &matrix, (&shares, step), &vec![all; team.count()]);
-    Matrix { outliers, ..Matrix::compile(columns, class, rows) }
+    Matrix::compile(columns, class, rows).with_outliers(outliers)
 }
 
 #[cfg(test)]

@@ -147,6 +147,11 @@ impl Matrix {
         }
     }
 
+    /// The same of particles of which some stand along an outline.
+    pub fn with_outliers(self, outliers: Outliers) -> Self {
+        Self { outliers, ..self }
+    }
+
     /// Compiles the rows of the groups of this rank, of a matrix of which it has the columns that they lead to.
     pub fn in_window(mut self, census: &Arc<Census>, part: impl FnOnce(usize) -> Part) -> Self {
         let first = if self.count() == 0 { 0 } else { census.particles(self.columns.range()).start };

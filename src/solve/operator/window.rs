@@ -301,5 +301,5 @@ pub fn fetched(
             () => assembly.add(columns.len(), &arrived.next().expect("as many as were sent")),
         }
     }
-    Matrix { outliers: matrix.outliers.clone(), ..assembly.into_matrix() }
+    assembly.into_matrix().with_outliers(matrix.outliers.clone())
 }
