@@ -24,9 +24,7 @@ use crate::material::elastic::Elastic;
 use crate::material::fit::{Band, Fitted, Numbers};
 use crate::material::recovery::REACH;
 use crate::ranks::Team;
-use crate::scene::{
-    BodySource, LeaderMotion, Load, LoadSteps, RoleEntry, Scene, SceneError, SceneRegion, Weights,
-};
+use crate::scene::{BodySource, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion, Weights};
 use crate::sweep::Order;
 use crate::sweep::caches::Caches;
 use crate::sweep::domain::{Share, cuts, steps_of};
@@ -36,13 +34,12 @@ use crate::sweep::rows::usual_band;
 pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
     let averages = |elastic: &Elastic| elastic.averaged_dilatation().is_some();
     let materials = || scene.material.iter().chain(scene.inclusions.iter().map(|part| &part.material));
-    let keys: [(bool, &str); 7] = [
+    let keys: [(bool, &str); 6] = [
         (!matches!(scene.body, BodySource::Cut(_)), "body.shape"),
         (scene.is_fitted && materials().any(averages), "body.outline"),
         (matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. }), "neighbours.kind"),
         (scene.update.order == Order::Sequential, "update.order"),
         (scene.equilibrium.is_some() && !is_solved_in_parts(scene), "equilibrium"),
-        (matches!(scene.load_steps, Some(LoadSteps::Solved(_))), "load_steps"),
         (followed(scene).any(|(_, changed)| is_laid_out_otherwise(scene, changed)), "actions"),
     ];
     let of_role = |(k, entry): (usize, &RoleEntry)| {

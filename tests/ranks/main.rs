@@ -21,6 +21,7 @@ use flockform::solve::interrupt::Interrupt;
 use scenes::{load, planned};
 
 mod changed;
+mod increments;
 mod parts;
 mod rest;
 #[path = "../common/scenes.rs"]
