@@ -124,7 +124,7 @@ fn solve_plan(
     solve_corotated(plan, &Way::whole(&held), request, team).map_err(|error| refuse_corotated(scene, &error))
 }
 
-/// Every rank solves the whole body, and all end alike.
+/// Every rank solves the whole body, or each has a part of it, and all end alike.
 fn solve_corotated(
     plan: &Plan,
     way: &Way<'_>,
@@ -133,7 +133,9 @@ fn solve_corotated(
 ) -> Result<Solved, CorotatedError> {
     const INTERRUPTED: CorotatedError = CorotatedError::Solve(SolveError::Interrupted);
     let (flock, body) = (&plan.setup.flock, &plan.setup.body);
-    let solved = corotated::solve(flock, body, follows(plan), held_axes(plan), way, request);
+    let parted = team.filter(|_| body.part.is_some());
+    let solved =
+        corotated::solve_in_parts((flock, body), follows(plan), held_axes(plan), way, request, parted);
     let is_interrupted = solved.as_ref().is_err_and(|error| *error == INTERRUPTED);
     if team.is_some_and(|team| team.any(is_interrupted)) { Err(INTERRUPTED) } else { solved }
 }

@@ -10,8 +10,8 @@ use crate::flock::law::Weights;
 use crate::flock::outlay::MOST_SITES;
 use crate::flock::role::Role;
 use crate::geometry::outline::{Outline, Place};
-use crate::scene::{BodySource, Scene};
-use crate::solve::corotated::is_corotated;
+use crate::scene::{BodySource, Scene, Weights as FixedWeights};
+use crate::solve::corotated::{self, is_corotated};
 use crate::solve::equilibrium::{
     Choice, DIRECT_UP_TO, FACTORISED_UP_TO, Precision, Solver, UNSYMMETRIC_UP_TO,
 };
@@ -69,8 +69,14 @@ pub fn solving(scene: &Scene, plan: &Plan) -> usize {
     /// The matrix of a body that turns, which differs from row to row, and its factor.
     const COROTATED: f64 = 4_600.0;
     let Some(asked) = &scene.equilibrium else { return 0 };
-    let is_shared = !matches!(asked.request.solver, Choice::This(solver) if !solver.is_shared());
-    let count = if is_shared { plan.count() } else { plan.setup.body.total() } as f64;
+    let total = plan.setup.body.total();
+    let is_shared = match asked.request.solver {
+        Choice::This(solver) => solver.is_shared(),
+        Choice::Auto if is_corotated(&plan.setup.flock) => total > corotated::DIRECT_UP_TO,
+        // Neighbours hardly feel each other alike.
+        Choice::Auto => scene.weights != Some(FixedWeights::Solved),
+    };
+    let count = if is_shared { plan.count() } else { total } as f64;
     let is_direct = match asked.request.solver {
         Choice::This(solver) => solver == Solver::Direct,
         Choice::Auto => plan.count() <= UNSYMMETRIC_UP_TO && is_one_sided(plan),

@@ -16,7 +16,7 @@ use crate::flock::lattice::Lattice;
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::outlay::{Census, Outlay, cell_width};
 use crate::flock::part::{AlongOutline, Extent, Part};
-use crate::flock::rules::{Mean, Rotation};
+use crate::flock::rules::Mean;
 use crate::geometry::partition::Partition;
 use crate::material::boundary::Boundary;
 use crate::material::cells::{Cells, templates};
@@ -24,7 +24,7 @@ use crate::material::elastic::Elastic;
 use crate::material::fit::{Band, Fitted, Numbers};
 use crate::material::recovery::REACH;
 use crate::ranks::Team;
-use crate::scene::{BodySource, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion, Weights};
+use crate::scene::{BodySource, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion};
 use crate::sweep::Order;
 use crate::sweep::caches::Caches;
 use crate::sweep::domain::{Share, cuts, steps_of};
@@ -58,15 +58,13 @@ fn is_laid_out_otherwise(scene: &Scene, changed: &Scene) -> bool {
         || laid_out_whole_for(changed).is_some()
 }
 
-/// Whether the equilibrium that a scene asks for can be found where no rank has the whole: as a linear system, of particles that
-/// all stand at sites of the lattice.
+/// Whether the equilibrium that a scene asks for can be found where no rank has the whole: of particles that all stand at sites of
+/// the lattice.
 fn is_solved_in_parts(scene: &Scene) -> bool {
-    let is_linear = !matches!(scene.mean, Mean::Material { rotation: Rotation::Corotated });
     let is_chosen = scene.equilibrium.is_some_and(|asked| asked.accuracy.is_some());
     // A shape that cannot be laid out is refused later.
     let is_cut = || source(scene).is_ok_and(|(fitted, _)| fitted.is_some_and(|fitted| !fitted.is_whole));
-    let is_listed = !matches!(scene.weights, Some(Weights::Solved | Weights::Gradient { .. }));
-    is_linear && is_listed && !is_chosen && !(scene.is_fitted && is_cut())
+    !is_chosen && !(scene.is_fitted && is_cut())
 }
 
 /// Which columns of a body are whose.

@@ -26,6 +26,8 @@ mod parts;
 mod rest;
 #[path = "../common/scenes.rs"]
 mod scenes;
+mod turned;
+mod weighted;
 mod written;
 
 /// Everything that a run leaves, to the bit.
