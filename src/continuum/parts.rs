@@ -20,7 +20,6 @@ use crate::flock::rules::Mean;
 use crate::geometry::partition::Partition;
 use crate::material::boundary::Boundary;
 use crate::material::cells::{Cells, templates};
-use crate::material::elastic::Elastic;
 use crate::material::fit::{Band, Fitted, Numbers};
 use crate::material::recovery::REACH;
 use crate::ranks::Team;
@@ -32,11 +31,8 @@ use crate::sweep::rows::usual_band;
 
 /// The key for which a scene has to be laid out as a whole, on every rank; `None` where each can lay out its part.
 pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
-    let averages = |elastic: &Elastic| elastic.averaged_dilatation().is_some();
-    let materials = || scene.material.iter().chain(scene.inclusions.iter().map(|part| &part.material));
-    let keys: [(bool, &str); 6] = [
+    let keys: [(bool, &str); 5] = [
         (!matches!(scene.body, BodySource::Cut(_)), "body.shape"),
-        (scene.is_fitted && materials().any(averages), "body.outline"),
         (matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. }), "neighbours.kind"),
         (scene.update.order == Order::Sequential, "update.order"),
         (scene.equilibrium.is_some() && !is_solved_in_parts(scene), "equilibrium"),
@@ -65,6 +61,12 @@ fn is_solved_in_parts(scene: &Scene) -> bool {
     // A shape that cannot be laid out is refused later.
     let is_cut = || source(scene).is_ok_and(|(fitted, _)| fitted.is_some_and(|fitted| !fitted.is_whole));
     !is_chosen && !(scene.is_fitted && is_cut())
+}
+
+/// Whether a material of the body is so close to incompressible that its dilatations are averaged over cells.
+fn averages_dilatations(scene: &Scene) -> bool {
+    let mut materials = scene.material.iter().chain(scene.inclusions.iter().map(|part| &part.material));
+    materials.any(|elastic| elastic.averaged_dilatation().is_some())
 }
 
 /// Which columns of a body are whose.
@@ -173,7 +175,9 @@ impl Parting {
             return Err(refuse_body(scene, &outlay.empty()));
         }
         let reach = outlay.reach().map_err(|error| refuse_body(scene, &error))?;
-        let reach = fitted.iter().map(|fitted| fitted.band.reach()).fold(reach, i32::max);
+        // Particles along an outline see each other as far as those of the lattice do.
+        let cells_away = if averages_dilatations(scene) { 2 } else { 1 };
+        let reach = fitted.iter().map(|fitted| cells_away * fitted.band.reach()).fold(reach, i32::max);
         // A cell's neighbours say over which others it averages its dilatation; along an outline stress is recovered from cells
         // that are farther away.
         let margin = 2 * cell_width(&outlay.cells);

@@ -17,6 +17,7 @@ use super::{Looks, on_ranks};
 const EVEN: &str = "load_steps={increments=4}";
 /// Unloaded in the end.
 const BACK: &str = "load_steps={schedule=[0.5,1.0,0.25,0.0]}";
+const SOFT: &str = "material={kind=\"isotropic\",young=1000.0,poisson=0.49,plane=\"strain\"}";
 const GRID: &str = "body={shape={kind=\"grid\",columns=24,rows=9}}";
 const PAPER: [&str; 2] = ["rule.mean.kind=\"barycentre\"", "neighbours={kind=\"second\"}"];
 const LED: &str = "{region={kind=\"edge\",side=\"right\",depth=1.5},role=\"leader\",axis=\"x\",\
@@ -56,6 +57,7 @@ fn equilibria_on_the_way_of_a_body_in_parts_have_the_bits_of_those_of_one_alone(
         &[&multigrid, EVEN, inclusion, SEVERAL],
         &[&multigrid, BACK, &pulled, SEVERAL],
         &[&auto, EVEN, whole_cells],
+        &[&auto, EVEN, SOFT, SEVERAL],
         &[&auto, EVEN, PAPER[0], PAPER[1]],
         &[&auto, BACK, PAPER[0], PAPER[1], GRID, "frame=\"lagged\""],
         // It ends short of its tolerance in the first.

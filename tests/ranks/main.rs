@@ -20,6 +20,7 @@ use flockform::solve::interrupt::Interrupt;
 
 use scenes::{load, planned};
 
+mod averaged;
 mod changed;
 mod increments;
 mod parts;
