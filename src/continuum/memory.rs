@@ -69,14 +69,7 @@ pub fn solving(scene: &Scene, plan: &Plan) -> usize {
     /// The matrix of a body that turns, which differs from row to row, and its factor.
     const COROTATED: f64 = 4_600.0;
     let Some(asked) = &scene.equilibrium else { return 0 };
-    let total = plan.setup.body.total();
-    let is_shared = match asked.request.solver {
-        Choice::This(solver) => solver.is_shared(),
-        Choice::Auto if is_corotated(&plan.setup.flock) => total > corotated::DIRECT_UP_TO,
-        // Neighbours hardly feel each other alike.
-        Choice::Auto => scene.weights != Some(FixedWeights::Solved),
-    };
-    let count = if is_shared { plan.count() } else { total } as f64;
+    let count = if iterates_in_parts(scene, plan) { plan.count() } else { plan.setup.body.total() } as f64;
     let is_direct = match asked.request.solver {
         Choice::This(solver) => solver == Solver::Direct,
         Choice::Auto => plan.count() <= UNSYMMETRIC_UP_TO && is_one_sided(plan),
@@ -86,6 +79,17 @@ pub fn solving(scene: &Scene, plan: &Plan) -> usize {
         (false, true) => factor(count),
         (false, false) => (BY_ITERATION * count) as usize,
     }
+}
+
+/// Whether ranks that have parts of a body share the iterations by which its equilibrium is found, as far as its size and its
+/// rule say; otherwise each of them is given the whole matrix.
+pub(super) fn iterates_in_parts(scene: &Scene, plan: &Plan) -> bool {
+    scene.equilibrium.is_some_and(|asked| match asked.request.solver {
+        Choice::This(solver) => solver.is_shared(),
+        Choice::Auto if is_corotated(&plan.setup.flock) => plan.setup.body.total() > corotated::DIRECT_UP_TO,
+        // Neighbours hardly feel each other alike.
+        Choice::Auto => scene.weights != Some(FixedWeights::Solved),
+    })
 }
 
 /// Bytes of the factor that an automatic choice falls back on where its iteration takes the body for unstable; `None` where
