@@ -16,7 +16,6 @@ use crate::flock::lattice::Lattice;
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::outlay::{Census, Outlay, cell_width};
 use crate::flock::part::{AlongOutline, Extent, Part};
-use crate::flock::rules::Mean;
 use crate::geometry::partition::Partition;
 use crate::material::boundary::Boundary;
 use crate::material::cells::{Cells, templates};
@@ -48,8 +47,7 @@ pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
 
 /// Whether keys that change on the way ask for other columns around those of a part, or for the whole.
 fn is_laid_out_otherwise(scene: &Scene, changed: &Scene) -> bool {
-    let is_material = |scene: &Scene| matches!(scene.mean, Mean::Material { .. });
-    is_material(changed) != is_material(scene)
+    changed.is_fitted != scene.is_fitted
         || changed.neighbourhood != scene.neighbourhood
         || laid_out_whole_for(changed).is_some()
 }
@@ -180,7 +178,9 @@ impl Parting {
         let reach = fitted.iter().map(|fitted| cells_away * fitted.band.reach()).fold(reach, i32::max);
         // A cell's neighbours say over which others it averages its dilatation; along an outline stress is recovered from cells
         // that are farther away.
-        let margin = 2 * cell_width(&outlay.cells);
+        let later = followed(scene).filter_map(|(_, changed)| outlay_if_cut(changed));
+        let width = |outlay: &Outlay<'_>| cell_width(&outlay.cells);
+        let margin = 2 * later.map(|later| width(&later)).fold(width(&outlay), i32::max);
         let margin = fitted.iter().map(|_| 2 * reach + recovery_reach(&scene.lattice)).fold(margin, i32::max);
         let cuts = cuts(counts.iter().map(|&count| count as usize), ranks);
         let before = sums(counts.iter().copied());
@@ -402,9 +402,14 @@ fn reach(scene: &Scene, fitted: Option<&FittedBand>) -> Result<i32, SceneError> 
 }
 
 fn outlay(scene: &Scene) -> Result<Outlay<'_>, SceneError> {
+    let refused = || scene.refuse("body.shape", "points are no columns", "run it as a whole");
+    outlay_if_cut(scene).ok_or_else(refused)
+}
+
+fn outlay_if_cut(scene: &Scene) -> Option<Outlay<'_>> {
     match &scene.body {
-        BodySource::Cut(cut) => Ok(outlay_of(scene, cut)),
-        _ => Err(scene.refuse("body.shape", "points are no columns", "run it as a whole")),
+        BodySource::Cut(cut) => Some(outlay_of(scene, cut)),
+        _ => None,
     }
 }
 
