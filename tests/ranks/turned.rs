@@ -47,7 +47,8 @@ fn equilibria_of_corotated_materials_in_parts_have_the_bits_of_those_of_a_whole(
         &[whole_cells, &far],
     ] {
         for solver in ["auto", "multigrid"] {
-            let sets = [&[TURNS, &asked(solver), record], sets].concat();
+            let asked = asked(solver);
+            let sets = [&[TURNS, &asked, record], sets].concat();
             assert_scene_parted_the_same(&plate(PLATE, &sets), &format!("{sets:?}"), 60);
         }
     }
@@ -58,8 +59,8 @@ fn equilibria_of_corotated_materials_in_parts_have_the_bits_of_those_of_a_whole(
 /// Large enough for several ranks to share two levels.
 #[test]
 fn a_large_equilibrium_of_a_corotated_material_too() {
-    let fine = "lattice={kind=\"square\",spacing=0.14}";
-    let sets = [TURNS, &asked("multigrid"), fine, "record.probes=[]", &bent([-1.0, 3.0])];
+    let fine = "lattice={kind=\"square\",spacing=0.16}";
+    let sets = [TURNS, &asked("multigrid"), fine, "record.probes=[]", &bent([-0.5, 1.5])];
     assert_scene_parted_the_same(&plate(PLATE, &sets), "large", 60);
 }
 

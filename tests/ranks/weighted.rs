@@ -7,9 +7,12 @@ const SOLVED: [&str; 2] = ["rule.weights={kind=\"solved\"}", "neighbours={kind=\
 const GRADIENT: [&str; 2] =
     ["rule.weights={kind=\"gradient\",length=1.5}", "neighbours={kind=\"collinear\"}"];
 
+const PULLED: &str = "roles=[{region={kind=\"edge\",side=\"left\"},role=\"clamped\"},\
+     {region={kind=\"edge\",side=\"right\"},role=\"leader\",motion={kind=\"velocity\",per_step=[0.02,0.01]}}]";
+
 fn assert_at_rest_the_same(solver: &str, sets: &[&str]) {
     let asked = format!("equilibrium={{solver=\"{solver}\",tolerance=1e-7}}");
-    let always = [&asked[..], "record.probes=[]", "update.damping=0.6"];
+    let always = [&asked[..], "record.probes=[]", "update.damping=0.6", PULLED];
     let sets = [&always[..], sets].concat();
     assert_scene_parted_the_same(&load("tension", &sets), &format!("{sets:?}"), 60);
 }
@@ -18,13 +21,11 @@ fn assert_at_rest_the_same(solver: &str, sets: &[&str]) {
 fn equilibria_of_weights_that_are_found_from_places_have_the_same_bits_in_parts() {
     let fine = "body.shape={kind=\"grid\",columns=60,rows=14}";
     for more in [&["frame=\"none\""][..], &["frame=\"none\"", fine]] {
-        for solver in ["auto", "gauss-seidel"] {
-            assert_at_rest_the_same(solver, &[&SOLVED[..], more].concat());
-            assert_at_rest_the_same(solver, &[&GRADIENT[..], more].concat());
-        }
+        assert_at_rest_the_same("auto", &[&SOLVED[..], more].concat());
+        assert_at_rest_the_same("auto", &[&GRADIENT[..], more].concat());
         assert_at_rest_the_same("multigrid", &[&GRADIENT[..], more].concat());
     }
-    for solver in ["direct", "jacobi"] {
+    for solver in ["direct", "gauss-seidel"] {
         assert_at_rest_the_same(solver, &[&SOLVED[..], &["frame=\"none\""]].concat());
         assert_at_rest_the_same(solver, &[&GRADIENT[..], &["frame=\"none\""]].concat());
     }
