@@ -58,7 +58,7 @@ fn is_solved_in_parts(scene: &Scene) -> bool {
     let is_chosen = scene.equilibrium.is_some_and(|asked| asked.accuracy.is_some());
     // A shape that cannot be laid out is refused later.
     let is_cut = || source(scene).is_ok_and(|(fitted, _)| fitted.is_some_and(|fitted| !fitted.is_whole));
-    !is_chosen && !(scene.is_fitted && is_cut())
+    !(is_chosen || scene.is_fitted && is_cut())
 }
 
 /// Whether a material of the body is so close to incompressible that its dilatations are averaged over cells.
