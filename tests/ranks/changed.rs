@@ -68,6 +68,10 @@ fn loads_and_constants_that_change_on_the_way_of_a_material_in_parts_too() {
 fn a_body_in_parts_becomes_a_material_or_ceases_to_be_one_as_one_alone_does() {
     let grid = "body={shape={kind=\"grid\",columns=24,rows=9}}";
     let second = "neighbours={kind=\"second\"}";
+    // Dilatations are averaged over cells two columns away.
+    let soft = "material={kind=\"isotropic\",young=1000.0,poisson=0.49,plane=\"strain\"}";
+    let wide = "neighbours={kind=\"chebyshev\",radius=2}";
+    let long = "body={shape={kind=\"grid\",columns=160,rows=9}}";
     let [rigid, loose] = ["material", "barycentre"].map(|kind| format!("rule.mean={{kind={kind:?}}}"));
     let both = actions(&[
         &set(12, &[&rigid, "update.damping=0.5"]),
@@ -79,6 +83,7 @@ fn a_body_in_parts_becomes_a_material_or_ceases_to_be_one_as_one_alone_does() {
         &[&loose[..], &becomes][..],
         &[&loose, &both],
         &[&loose, &becomes, "lattice={kind=\"hexagonal\",spacing=1.0}"],
+        &[&loose, &becomes, soft, wide, long],
         &[&rigid, &ceases],
         &[&rigid, &ceases, "lattice={kind=\"hexagonal\",spacing=1.0}"],
     ] {
