@@ -331,6 +331,8 @@ fn a_run_in_parts_writes_the_tables_of_a_run_alone() {
         ("fitted.toml", &[]),
         ("beam-loaded", &[]),
         ("beam-loaded", &LARGE_BEAM),
+        ("beam-loaded", &[&LARGE_BEAM[..], &["--set", "load_steps={increments=2}"]].concat()),
+        ("elastica", &["--set", "load_steps={increments=3}"]),
     ] {
         let run = |out: &'static str| [&["run", name, "--out", out][..], &PARTED, more].concat();
         assert_ends_well(&flockform(&run("alone"), folder.path()), name);
