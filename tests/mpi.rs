@@ -331,6 +331,8 @@ fn a_run_in_parts_writes_the_tables_of_a_run_alone() {
         ("fitted.toml", &[]),
         ("beam-loaded", &[]),
         ("beam-loaded", &LARGE_BEAM),
+        ("beam-loaded", &[&LARGE_BEAM[..], &["--set", "load_steps={increments=2}"]].concat()),
+        ("elastica", &["--set", "load_steps={increments=3}"]),
     ] {
         let run = |out: &'static str| [&["run", name, "--out", out][..], &PARTED, more].concat();
         assert_ends_well(&flockform(&run("alone"), folder.path()), name);
@@ -467,9 +469,10 @@ fn begun(ranks: usize, long: &[&str], frozen: usize, folder: &Path) -> (Running,
     (run, processes)
 }
 
+/// Waits until a run has kept a checkpoint, or has ended already.
 fn wait_for_checkpoint(folder: &Path) {
-    let checkpoint = folder.join("o.unfinished/checkpoint");
-    within(PATIENCE, "a checkpoint", || checkpoint.exists().then_some(()));
+    let places = ["o.unfinished/checkpoint", "o"].map(|of| folder.join(of));
+    within(PATIENCE, "a checkpoint", || places.iter().any(|place| place.exists()).then_some(()));
 }
 
 /// Waits until the launcher has ended; whether it ended well, and its words: MPICH's says on its output what went wrong.
@@ -532,35 +535,46 @@ fn a_killed_rank_ends_the_run_which_goes_on_with_any_number_of_ranks() {
 fn a_rank_killed_at_any_moment_costs_no_more_than_the_last_checkpoint() {
     const KILLS: usize = 20;
     let expected = alone(&LONG);
-    let undisturbed = {
+    // How long a run takes that is not disturbed, before its first checkpoint and from there to its results.
+    let mut longest = {
         let folder = temporary();
         let (mut run, _) = started(2, &LONG, folder.path());
         let begin = Instant::now();
+        wait_for_checkpoint(folder.path());
+        let first = begin.elapsed();
+        within(PATIENCE, "results", || folder.path().join("o").exists().then_some(()));
+        let all = begin.elapsed();
         assert!(ended(&mut run).0);
-        begin.elapsed()
+        [first, all - first]
     };
     // Of a resumed run, one that had ended, and one without a checkpoint yet.
     let mut counts = [0; 3];
-    // Runs may be faster than the first: those that had ended are no kills.
-    let (mut longest, mut kills) = (undisturbed, 0);
+    let mut kills = 0;
     for n in 0..80 {
         let folder = temporary();
         let random = RandomState::new().hash_one(n);
-        let (victim, after) = (random as usize % 2, longest.mul_f64((random >> 32) as f64 / 2f64.powi(32)));
-        let what = format!("rank {victim} killed after {after:?} of {longest:?}");
+        // Ranks may take longer to begin than to take all of their steps: of every other one a checkpoint is waited for.
+        let (victim, is_kept) = (random as usize % 2, n % 2 == 1);
+        let longest = &mut longest[usize::from(is_kept)];
+        let after = longest.mul_f64((random >> 32) as f64 / 2f64.powi(32));
         let (mut run, ranks) = started(2, &LONG, folder.path());
+        if is_kept {
+            wait_for_checkpoint(folder.path());
+        }
         std::thread::sleep(after);
+        // Runs may be faster than the first: those that had ended are no kills.
         match signals::is_sent("KILL", ranks[victim]) {
             true => kills += 1,
-            false => longest = longest.mul_f64(0.8),
+            false => *longest = longest.mul_f64(0.8),
         }
         let (_, said) = ended(&mut run);
+        let what = format!("rank {victim} killed after {after:?} of {longest:?}, kept: {is_kept}");
         let [done, left] =
             ["o/summary.json", "o.unfinished/checkpoint"].map(|of| folder.path().join(of).exists());
         match (done, left) {
             (true, _) => assert_same(&folder.path().join("o"), &expected.path().join("o"), &what),
-            (false, true) => assert_resumes(1 + n % 2, folder.path(), expected.path(), &what),
-            (false, false) => assert!(!folder.path().join("o").exists(), "{what}: {said}"),
+            (false, true) => assert_resumes(1 + n / 2 % 2, folder.path(), expected.path(), &what),
+            (false, false) => assert!(!is_kept && !folder.path().join("o").exists(), "{what}: {said}"),
         }
         counts[if done { 1 } else { usize::from(!left) * 2 }] += 1;
         if kills == KILLS {

@@ -10,6 +10,7 @@ use super::plan::Plan;
 use super::run::{Outcome, SharedError, StopReason, overflow, run_shared, run_watched};
 use crate::engine::Engine;
 use crate::engine::observer::{EachStep, Observer};
+use crate::engine::setup::Setup;
 use crate::engine::shared::Agreed;
 use crate::engine::state::EngineState;
 use crate::flock::role::Role;
@@ -115,14 +116,7 @@ fn solve_plan(
     team: Option<&Team>,
 ) -> Result<Solved, SceneError> {
     if !corotated::is_corotated(&plan.setup.flock) {
-        let system = match team.filter(|_| plan.setup.body.part.is_some()) {
-            None => of_plan(scene, plan)?,
-            Some(team) => {
-                let body = &plan.setup.body;
-                let part = SystemPart { team: team.clone(), first: body.first(), owned: body.owned() };
-                agreed(scene, team, of_plan(scene, plan))?.of_part(part)
-            }
-        };
+        let system = shared_system(scene, plan, team, plan.stop.steps as f64)?;
         return solve_shared(&system, request, team).map_err(|error| refuse(scene, &error));
     }
     let steps = steps_of_the_way(plan) as f64;
@@ -130,7 +124,7 @@ fn solve_plan(
     solve_corotated(plan, &Way::whole(&held), request, team).map_err(|error| refuse_corotated(scene, &error))
 }
 
-/// Every rank solves the whole body, and all end alike.
+/// Every rank solves the whole body, or each has a part of it, and all end alike.
 fn solve_corotated(
     plan: &Plan,
     way: &Way<'_>,
@@ -139,7 +133,9 @@ fn solve_corotated(
 ) -> Result<Solved, CorotatedError> {
     const INTERRUPTED: CorotatedError = CorotatedError::Solve(SolveError::Interrupted);
     let (flock, body) = (&plan.setup.flock, &plan.setup.body);
-    let solved = corotated::solve(flock, body, follows(plan), held_axes(plan), way, request);
+    let parted = team.filter(|_| body.part.is_some());
+    let solved =
+        corotated::solve_in_parts((flock, body), follows(plan), held_axes(plan), way, request, parted);
     let is_interrupted = solved.as_ref().is_err_and(|error| *error == INTERRUPTED);
     if team.is_some_and(|team| team.any(is_interrupted)) { Err(INTERRUPTED) } else { solved }
 }
@@ -202,7 +198,14 @@ pub fn of_plan(scene: &Scene, plan: &Plan) -> Result<System, SceneError> {
     of_plan_after(scene, plan, plan.stop.steps as f64)
 }
 
-/// The same with the leaders where they are after so many steps.
+/// The same with the leaders where they are after so many steps; of a body in parts this rank's, which all have or none.
+fn shared_system(scene: &Scene, plan: &Plan, team: Option<&Team>, steps: f64) -> Result<System, SceneError> {
+    let (body, own) = (&plan.setup.body, of_plan_after(scene, plan, steps));
+    let Some(team) = team.filter(|_| body.part.is_some()) else { return own };
+    let part = SystemPart { team: team.clone(), first: body.first(), owned: body.owned() };
+    Ok(agreed(scene, team, own)?.of_part(part))
+}
+
 fn of_plan_after(scene: &Scene, plan: &Plan, steps: f64) -> Result<System, SceneError> {
     let held = held_after(plan, steps);
     let components = held_components(&plan.setup.changes, &plan.setup.body, steps);
@@ -263,14 +266,20 @@ fn refuse(scene: &Scene, error: &SolveError) -> SceneError {
 
 fn outcome(plan: Plan, solved: Solved, team: Option<&Team>) -> Outcome {
     let (step, spacing) = (plan.stop.steps, plan.setup.body.lattice.spacing());
-    let mut engine = Engine::new(plan.setup);
-    if let Some(team) = team.filter(|_| engine.body().part.is_some()) {
-        engine.join(team.clone()).expect("a body that is swept in sequence is laid out whole");
-    }
+    let mut engine = engine_of(plan.setup, team);
     engine.place_at_rest(step, &solved.displacement);
     let residual = farthest_from_target(&engine) / spacing;
     let reason = overflow(&engine).map_or_else(|| reason(&solved), StopReason::Diverged);
     Outcome { engine, reason, residual, solved: Some(solved) }
+}
+
+/// The engine of a body that is put to rest: shared where each rank has a part of it.
+fn engine_of(setup: Setup, team: Option<&Team>) -> Engine {
+    let mut engine = Engine::new(setup);
+    if let Some(team) = team.filter(|_| engine.body().part.is_some()) {
+        engine.join(team.clone()).expect("a body that is swept in sequence is laid out whole");
+    }
+    engine
 }
 
 fn reason(solved: &Solved) -> StopReason {

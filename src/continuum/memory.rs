@@ -10,8 +10,8 @@ use crate::flock::law::Weights;
 use crate::flock::outlay::MOST_SITES;
 use crate::flock::role::Role;
 use crate::geometry::outline::{Outline, Place};
-use crate::scene::{BodySource, Scene};
-use crate::solve::corotated::is_corotated;
+use crate::scene::{BodySource, Scene, Weights as FixedWeights};
+use crate::solve::corotated::{self, is_corotated};
 use crate::solve::equilibrium::{
     Choice, DIRECT_UP_TO, FACTORISED_UP_TO, Precision, Solver, UNSYMMETRIC_UP_TO,
 };
@@ -69,8 +69,7 @@ pub fn solving(scene: &Scene, plan: &Plan) -> usize {
     /// The matrix of a body that turns, which differs from row to row, and its factor.
     const COROTATED: f64 = 4_600.0;
     let Some(asked) = &scene.equilibrium else { return 0 };
-    let is_shared = !matches!(asked.request.solver, Choice::This(solver) if !solver.is_shared());
-    let count = if is_shared { plan.count() } else { plan.setup.body.total() } as f64;
+    let count = if iterates_in_parts(scene, plan) { plan.count() } else { plan.setup.body.total() } as f64;
     let is_direct = match asked.request.solver {
         Choice::This(solver) => solver == Solver::Direct,
         Choice::Auto => plan.count() <= UNSYMMETRIC_UP_TO && is_one_sided(plan),
@@ -80,6 +79,17 @@ pub fn solving(scene: &Scene, plan: &Plan) -> usize {
         (false, true) => factor(count),
         (false, false) => (BY_ITERATION * count) as usize,
     }
+}
+
+/// Whether ranks that have parts of a body share the iterations by which its equilibrium is found, as far as its size and its
+/// rule say; otherwise each of them is given the whole matrix.
+pub(super) fn iterates_in_parts(scene: &Scene, plan: &Plan) -> bool {
+    scene.equilibrium.is_some_and(|asked| match asked.request.solver {
+        Choice::This(solver) => solver.is_shared(),
+        Choice::Auto if is_corotated(&plan.setup.flock) => plan.setup.body.total() > corotated::DIRECT_UP_TO,
+        // Neighbours hardly feel each other alike.
+        Choice::Auto => scene.weights != Some(FixedWeights::Solved),
+    })
 }
 
 /// Bytes of the factor that an automatic choice falls back on where its iteration takes the body for unstable; `None` where

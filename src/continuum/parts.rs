@@ -16,17 +16,13 @@ use crate::flock::lattice::Lattice;
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::outlay::{Census, Outlay, cell_width};
 use crate::flock::part::{AlongOutline, Extent, Part};
-use crate::flock::rules::{Mean, Rotation};
 use crate::geometry::partition::Partition;
 use crate::material::boundary::Boundary;
 use crate::material::cells::{Cells, templates};
-use crate::material::elastic::Elastic;
 use crate::material::fit::{Band, Fitted, Numbers};
 use crate::material::recovery::REACH;
 use crate::ranks::Team;
-use crate::scene::{
-    BodySource, LeaderMotion, Load, LoadSteps, RoleEntry, Scene, SceneError, SceneRegion, Weights,
-};
+use crate::scene::{BodySource, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion};
 use crate::sweep::Order;
 use crate::sweep::caches::Caches;
 use crate::sweep::domain::{Share, cuts, steps_of};
@@ -34,15 +30,11 @@ use crate::sweep::rows::usual_band;
 
 /// The key for which a scene has to be laid out as a whole, on every rank; `None` where each can lay out its part.
 pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
-    let averages = |elastic: &Elastic| elastic.averaged_dilatation().is_some();
-    let materials = || scene.material.iter().chain(scene.inclusions.iter().map(|part| &part.material));
-    let keys: [(bool, &str); 7] = [
+    let keys: [(bool, &str); 5] = [
         (!matches!(scene.body, BodySource::Cut(_)), "body.shape"),
-        (scene.is_fitted && materials().any(averages), "body.outline"),
         (matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. }), "neighbours.kind"),
         (scene.update.order == Order::Sequential, "update.order"),
-        (scene.equilibrium.is_some() && !is_solved_in_parts(scene), "equilibrium"),
-        (matches!(scene.load_steps, Some(LoadSteps::Solved(_))), "load_steps"),
+        (scene.equilibrium.is_some_and(|asked| asked.accuracy.is_some()), "equilibrium"),
         (followed(scene).any(|(_, changed)| is_laid_out_otherwise(scene, changed)), "actions"),
     ];
     let of_role = |(k, entry): (usize, &RoleEntry)| {
@@ -55,18 +47,15 @@ pub fn laid_out_whole_for(scene: &Scene) -> Option<String> {
 
 /// Whether keys that change on the way ask for other columns around those of a part, or for the whole.
 fn is_laid_out_otherwise(scene: &Scene, changed: &Scene) -> bool {
-    let is_material = |scene: &Scene| matches!(scene.mean, Mean::Material { .. });
-    is_material(changed) != is_material(scene)
+    changed.is_fitted != scene.is_fitted
         || changed.neighbourhood != scene.neighbourhood
         || laid_out_whole_for(changed).is_some()
 }
 
-/// Whether the equilibrium that a scene asks for can be found where no rank has the whole: as a linear system.
-fn is_solved_in_parts(scene: &Scene) -> bool {
-    let is_linear = !matches!(scene.mean, Mean::Material { rotation: Rotation::Corotated });
-    let is_chosen = scene.equilibrium.is_some_and(|asked| asked.accuracy.is_some());
-    let is_listed = !matches!(scene.weights, Some(Weights::Solved | Weights::Gradient { .. }));
-    is_linear && is_listed && !is_chosen
+/// Whether a material of the body is so close to incompressible that its dilatations are averaged over cells.
+fn averages_dilatations(scene: &Scene) -> bool {
+    let mut materials = scene.material.iter().chain(scene.inclusions.iter().map(|part| &part.material));
+    materials.any(|elastic| elastic.averaged_dilatation().is_some())
 }
 
 /// Which columns of a body are whose.
@@ -175,10 +164,14 @@ impl Parting {
             return Err(refuse_body(scene, &outlay.empty()));
         }
         let reach = outlay.reach().map_err(|error| refuse_body(scene, &error))?;
-        let reach = fitted.iter().map(|fitted| fitted.band.reach()).fold(reach, i32::max);
+        // Particles along an outline see each other as far as those of the lattice do.
+        let cells_away = if averages_dilatations(scene) { 2 } else { 1 };
+        let reach = fitted.iter().map(|fitted| cells_away * fitted.band.reach()).fold(reach, i32::max);
         // A cell's neighbours say over which others it averages its dilatation; along an outline stress is recovered from cells
         // that are farther away.
-        let margin = 2 * cell_width(&outlay.cells);
+        let later = followed(scene).filter_map(|(_, changed)| outlay_if_cut(changed));
+        let width = |outlay: &Outlay<'_>| cell_width(&outlay.cells);
+        let margin = 2 * later.map(|later| width(&later)).fold(width(&outlay), i32::max);
         let margin = fitted.iter().map(|_| 2 * reach + recovery_reach(&scene.lattice)).fold(margin, i32::max);
         let cuts = cuts(counts.iter().map(|&count| count as usize), ranks);
         let before = sums(counts.iter().copied());
@@ -400,9 +393,14 @@ fn reach(scene: &Scene, fitted: Option<&FittedBand>) -> Result<i32, SceneError> 
 }
 
 fn outlay(scene: &Scene) -> Result<Outlay<'_>, SceneError> {
+    let refused = || scene.refuse("body.shape", "points are no columns", "run it as a whole");
+    outlay_if_cut(scene).ok_or_else(refused)
+}
+
+fn outlay_if_cut(scene: &Scene) -> Option<Outlay<'_>> {
     match &scene.body {
-        BodySource::Cut(cut) => Ok(outlay_of(scene, cut)),
-        _ => Err(scene.refuse("body.shape", "points are no columns", "run it as a whole")),
+        BodySource::Cut(cut) => Some(outlay_of(scene, cut)),
+        _ => None,
     }
 }
 

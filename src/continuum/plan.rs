@@ -184,9 +184,9 @@ impl Plan {
             },
             ..Setup::new(body, flock, roles, update)
         };
-        // One that is put to rest has no history.
+        // One that is put to rest at once has no history.
         let is_parted = setup.body.part.is_some();
-        if is_parted && scene.equilibrium.is_none() && !probes.is_empty() {
+        if is_parted && !scene.is_solved_at_once() && !probes.is_empty() {
             setup.probes = Some(probes.iter().map(|&index| ProbeSeries::new(index)).collect());
         }
         take_first_roles(&mut setup);

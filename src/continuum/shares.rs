@@ -1,7 +1,7 @@
 //! How ranks would share a run, before any of them is started.
 
 use super::equilibrium::of_plan;
-use super::memory::{readable_bytes, solving, stepped};
+use super::memory::{iterates_in_parts, readable_bytes, solving, stepped};
 use super::parts::{Parting, laid_out_whole_for};
 use super::plan::Plan;
 use super::run::require_shareable;
@@ -68,6 +68,8 @@ pub struct PartShares {
     pub steps: usize,
     /// Whether it is solved and not stepped.
     pub is_solved: bool,
+    /// Whether the ranks share the iterations of its solver, as far as it can be known.
+    pub iterates_in_parts: bool,
     /// Bytes that it receives before as many, or in each step, or each iteration of a solver.
     pub halo_bytes: usize,
     /// What it lays out.
@@ -92,8 +94,9 @@ impl PartShares {
             None => Self::swept_together(&largest.setup, rank, ranks),
         };
         let is_solved = scene.equilibrium.is_some();
+        let iterates_in_parts = iterates_in_parts(scene, &largest);
         let (particles, halo_bytes) = (parting.counts(), PLACE * halo);
-        Ok(Some(Self { particles, steps, is_solved, halo_bytes, largest }))
+        Ok(Some(Self { particles, steps, is_solved, iterates_in_parts, halo_bytes, largest }))
     }
 
     /// Most steps that a rank takes together, and particles that it receives before these.
@@ -114,6 +117,9 @@ impl PartShares {
         let (least, most) = (self.particles.iter().min(), self.particles.iter().max());
         let (least, most) = (least.copied().unwrap_or_default(), most.copied().unwrap_or_default());
         let exchanged = match self.steps {
+            _ if self.is_solved && !self.iterates_in_parts => {
+                "; each is given the whole matrix and solves for the whole body".to_owned()
+            }
             _ if self.is_solved => {
                 format!(
                     "; where there are groups of columns enough, it iterates on about as many and receives about \

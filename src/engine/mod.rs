@@ -117,10 +117,6 @@ impl Engine {
             free_edge,
             probes,
         } = setup;
-        let owned = body.owned();
-        let own =
-            |probe: &ProbeSeries| body.exact_particle(probe.particle).is_some_and(|i| owned.contains(&i));
-        let probes = probes.map(|all| all.into_iter().filter(own).collect());
         let present_neighbours = present_radius.map(|radius| PresentNeighbours {
             radius,
             grid: CellGrid::default(),
@@ -150,7 +146,7 @@ impl Engine {
             load: Load::new(ramp, loads),
             settled: None,
             path: None,
-            probes,
+            probes: None,
             team: None,
             is_whole: true,
         };
@@ -166,7 +162,7 @@ impl Engine {
             }
         }
         engine.after_role_change();
-        engine.record_probes();
+        engine.begin_probes(probes);
         engine
     }
 

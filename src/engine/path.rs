@@ -52,19 +52,18 @@ impl Path {
         let rest = || Vectors::zeros(now.displacement.len());
         let unloaded = || Acting { loads: rest(), supports: rest(), displacement: rest() };
         let last = self.last.take().unwrap_or_else(unloaded);
-        let way = |i: usize| {
+        let done = |i: usize| {
             let ([x, y], [a, b]) = (now.displacement.get(i), last.displacement.get(i));
-            [x - a, y - b]
-        };
-        let work = |before: &Vectors, after: &Vectors| {
-            let of = |(i, (f, g)): (usize, ([f64; 2], [f64; 2]))| {
-                let [x, y] = way(i);
-                0.5 * ((f[0] + g[0]) * x + (f[1] + g[1]) * y)
+            let way = [x - a, y - b];
+            let work = |before: &Vectors, after: &Vectors| {
+                let (f, g) = (before.get(i), after.get(i));
+                0.5 * ((f[0] + g[0]) * way[0] + (f[1] + g[1]) * way[1])
             };
-            before.iter().zip(after.iter()).enumerate().map(of).sum::<f64>()
+            (i, [work(&last.loads, &now.loads), work(&last.supports, &now.supports)])
         };
-        self.done.loads += work(&last.loads, &now.loads);
-        self.done.supports += work(&last.supports, &now.supports);
+        let [loads, supports] = engine.sum_over([-0.0; 2], engine.body().owned().map(done));
+        self.done.loads += loads;
+        self.done.supports += supports;
         self.last = Some(now);
     }
 }

@@ -49,8 +49,18 @@ impl Engine {
         self.probes.as_deref().unwrap_or_default()
     }
 
+    /// Begins the histories of those of these particles that belong to this part with the state that the body is in, or goes on
+    /// with them.
+    pub(crate) fn begin_probes(&mut self, all: Option<Vec<ProbeSeries>>) {
+        let (body, owned) = (&self.body, self.body.owned());
+        let own =
+            |probe: &ProbeSeries| body.exact_particle(probe.particle).is_some_and(|i| owned.contains(&i));
+        self.probes = all.map(|all| all.into_iter().filter(own).collect());
+        self.record_probes();
+    }
+
     /// Appends the step that the body is at, unless an earlier run has.
-    pub(super) fn record_probes(&mut self) {
+    pub(crate) fn record_probes(&mut self) {
         let Some(mut probes) = self.probes.take() else { return };
         let is_new = |probe: &&mut ProbeSeries| probe.positions.len() == self.step;
         probes.iter_mut().filter(is_new).for_each(|probe| probe.record(self));

@@ -22,7 +22,7 @@ use crate::flock::fracture::{Bonds, Break};
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::part::Part;
 use crate::flock::vectors::{Vectors, distance};
-use crate::ranks::Team;
+use crate::ranks::{Team, added};
 use crate::sweep::caches::Caches;
 use crate::sweep::domain::{Domain, Halo, Held, Needs, Share};
 use crate::sweep::{Activity, Order, Stage, Steps};
@@ -153,24 +153,10 @@ impl Engine {
         start: [f64; N],
         own: impl Iterator<Item = (Option<usize>, [f64; N])>,
     ) -> [f64; N] {
-        let add = |sums: [f64; N], own: [f64; N]| std::array::from_fn(|k| sums[k] + own[k]);
-        let mut later: Vec<u64> = Vec::new();
-        let before = own.filter_map(|(place, own)| match place {
-            None => Some(own),
-            Some(place) => {
-                later.extend([place as u64].into_iter().chain(own.map(f64::to_bits)));
-                None
-            }
-        });
-        let Some(team) = self.parted() else { return before.fold(start, add) };
-        let chained = team.chain(start.map(f64::to_bits), |sums| {
-            before.fold(sums.map(f64::from_bits), add).map(f64::to_bits)
-        });
-        let later = if self.body.has_some_after_all() { team.gather_all(&later) } else { Vec::new() };
-        let mut later: Vec<&[u64]> = later.chunks_exact(N + 1).collect();
-        later.sort_unstable_by_key(|of| of[0]);
-        let numbers = later.into_iter().map(|of| std::array::from_fn(|k| f64::from_bits(of[k + 1])));
-        numbers.fold(chained.map(f64::from_bits), add)
+        match self.parted() {
+            None => own.map(|(_, own)| own).fold(start, added),
+            Some(team) => team.sum_in_order(start, own, self.body.has_some_after_all()),
+        }
     }
 
     /// The numbers of those particles of other parts that the particles of this one see, which the others know; none of a whole

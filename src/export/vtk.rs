@@ -269,50 +269,52 @@ fn write_frame(path: &Path, values: &Values<'_>) -> io::Result<()> {
 struct Values<'a> {
     engine: &'a Engine,
     stresses: Option<Stresses>,
-    /// Energies, strain, and stress of particles of other parts.
-    others: HashMap<usize, [f64; 10]>,
+    others: Others,
+}
+
+/// The numbers of particles of other parts.
+#[derive(Default)]
+struct Others {
+    energies: HashMap<usize, [f64; 2]>,
+    strains: HashMap<usize, [f64; 4]>,
+    stresses: HashMap<usize, [f64; 4]>,
 }
 
 impl<'a> Values<'a> {
     /// At the engine's present places; of a body in parts found by all ranks together.
     fn of(engine: &'a Engine, material: Option<&Elastic>) -> Self {
         let stresses = material.and_then(|elastic| Stresses::at_present(engine, elastic));
-        let mut values = Self { engine, stresses, others: HashMap::new() };
-        values.others = engine.of_others(|i| {
-            let ([pe1, pe2], [a, b, c, d]) = (values.energies(i), values.strain(i));
-            let [xx, yy, xy, von_mises] = values.stress(i);
-            [pe1, pe2, a, b, c, d, xx, yy, xy, von_mises]
-        });
-        values
-    }
-
-    /// Of another part those from this place on, of this one its `own`.
-    fn known<const N: usize>(&self, particle: usize, from: usize, own: impl Fn() -> [f64; N]) -> [f64; N] {
-        match self.others.get(&particle) {
-            Some(all) => std::array::from_fn(|k| all[from + k]),
-            None => own(),
-        }
+        let own = Self { engine, stresses, others: Others::default() };
+        let others = Others {
+            energies: engine.of_others(|i| own.energies(i)),
+            strains: engine.of_others(|i| own.strain(i)),
+            stresses: engine.of_others(|i| own.stress(i)),
+        };
+        Self { others, ..own }
     }
 
     /// PE1 \[length^2\] and PE2 \[length\].
     fn energies(&self, particle: usize) -> [f64; 2] {
-        self.known(particle, 0, || [self.engine.pe1(particle), self.engine.pe2(particle)])
+        let known = self.others.energies.get(&particle).copied();
+        known.unwrap_or_else(|| [self.engine.pe1(particle), self.engine.pe2(particle)])
     }
 
     /// Components and rotation, NaN for a particle that sees too few \[1, rad\].
     fn strain(&self, particle: usize) -> [f64; 4] {
-        self.known(particle, 2, || {
+        let own = || {
             self.engine.strain(particle).map_or([f64::NAN; 4], |Strain { components, rotation, .. }| {
                 let [xx, yy, xy] = components;
                 [xx, yy, xy, rotation]
             })
-        })
+        };
+        self.others.strains.get(&particle).copied().unwrap_or_else(own)
     }
 
     /// Components and von Mises stress, NaN for a particle in no whole cell \[force / length^2\].
     fn stress(&self, particle: usize) -> [f64; 4] {
         let own = || self.stresses.as_ref().and_then(|stresses| stresses.particles[particle]);
-        self.known(particle, 6, || own().map_or([f64::NAN; 4], |stress| with_von_mises(&stress)))
+        let known = self.others.stresses.get(&particle).copied();
+        known.unwrap_or_else(|| own().map_or([f64::NAN; 4], |stress| with_von_mises(&stress)))
     }
 }
 

@@ -151,7 +151,7 @@ impl MaterialWeights {
         if body.part.is_none() {
             require_rigid(cells, &incidence, &body.reference, |i| !body.is_frame[i])?;
         }
-        Self::gather(cells, &incidence, neighbours, elastic, None)
+        Self::gather((cells, &incidence), neighbours, elastic, None, &|i| body.index(i))
     }
 
     /// Weights of cells at any points, with a stiffness factor for each cell where given, shape
@@ -166,22 +166,31 @@ impl MaterialWeights {
         let incidence = cells.incidence(reference.len());
         require_rigid(&cells, &incidence, reference, |_| true)?;
         let neighbours = cells.neighbours(reference.len(), elastic);
-        Self::gather(&cells, &incidence, neighbours, elastic, factor)
+        Self::gather((&cells, &incidence), neighbours, elastic, factor, &|i| i)
     }
 
+    /// `index` is that of a particle in the whole body.
     fn gather(
-        cells: &Cells,
-        incidence: &Incidence,
+        (cells, incidence): (&Cells, &Incidence),
         neighbours: Neighbours,
         elastic: &Elastic,
         factor: Option<&[f64]>,
+        index: &(dyn Fn(usize) -> usize + Sync),
     ) -> Result<Self, WeightsError> {
         check_factor(cells, factor)?;
         let elements = elements(cells, elastic)?;
         let averaged = Patches::new(cells, incidence, neighbours.count(), elastic);
         let gradients = cells.shapes.iter().map(|shape| mean_gradients(shape)).collect();
-        let assembly =
-            Assembly { cells, incidence, neighbours: &neighbours, elements, gradients, averaged, factor };
+        let assembly = Assembly {
+            cells,
+            incidence,
+            neighbours: &neighbours,
+            elements,
+            gradients,
+            averaged,
+            factor,
+            index,
+        };
         let (class, first) = assembly.classes();
         // Every row is summed over its own cells in their order: the same bits on any number of threads.
         // Collected before looking: the first error in the order of particles, not the first to be found.

@@ -154,6 +154,32 @@ impl Team {
         self.each(words).last().copied().unwrap_or(words)
     }
 
+    /// What `start` and the numbers of all ranks, of which these are this one's `own`, add up to, in the order of the ranks; those
+    /// that have a place after all others, as some may where `has_later`, in the order of these.
+    pub(crate) fn sum_in_order<const N: usize>(
+        &self,
+        start: [f64; N],
+        own: impl Iterator<Item = (Option<usize>, [f64; N])>,
+        has_later: bool,
+    ) -> [f64; N] {
+        let mut later: Vec<u64> = Vec::new();
+        let before = own.filter_map(|(place, own)| match place {
+            None => Some(own),
+            Some(place) => {
+                later.extend([place as u64].into_iter().chain(own.map(f64::to_bits)));
+                None
+            }
+        });
+        let chained = self.chain(start.map(f64::to_bits), |sums| {
+            before.fold(sums.map(f64::from_bits), added).map(f64::to_bits)
+        });
+        let later = if has_later { self.gather_all(&later) } else { Vec::new() };
+        let mut later: Vec<&[u64]> = later.chunks_exact(N + 1).collect();
+        later.sort_unstable_by_key(|of| of[0]);
+        let numbers = later.into_iter().map(|of| std::array::from_fn(|k| f64::from_bits(of[k + 1])));
+        numbers.fold(chained.map(f64::from_bits), added)
+    }
+
     /// The bytes of each rank, shape \[ranks\].
     pub(crate) fn each_bytes(&self, own: &[u8]) -> Vec<Vec<u8>> {
         let lengths: Vec<usize> =
@@ -184,6 +210,11 @@ impl Team {
     fn exchange(&self) -> MutexGuard<'_, dyn Exchange + 'static> {
         self.exchange.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// The sum of each of the numbers.
+pub(crate) fn added<const N: usize>(sums: [f64; N], more: [f64; N]) -> [f64; N] {
+    std::array::from_fn(|k| sums[k] + more[k])
 }
 
 fn packed(bytes: &[u8]) -> Vec<u64> {

@@ -21,7 +21,7 @@ use iceoryx2::service::port_factory::{event, publish_subscribe};
 
 use super::payload::{Header, Payload};
 use super::wait::Bell;
-use super::{Peer, ShmError, domain};
+use super::{Peer, ShmError, domain, folders};
 
 /// How many can share a service: fixed by the process that creates it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -186,7 +186,10 @@ fn explain<T: Payload>(
             format!("at most {} processes can share it; end others", capacity.nodes())
         }
         OpenError::PublishSubscribeOpenError(Refusal::InsufficientPermissions) => {
-            format!("another user made it: keep apart by {}", domain::VARIABLE)
+            folders::closed(&peer.config).map_or_else(
+                || format!("another user made it: keep apart by {}", domain::VARIABLE),
+                |folder| format!("{} is its owner's alone: as that user, `chmod 1777` it", folder.display()),
+            )
         }
         OpenError::PublishSubscribeOpenError(Refusal::VersionMismatch) => {
             "another version of iceoryx2 made it: peers need 0.10".into()

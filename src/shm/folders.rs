@@ -75,6 +75,13 @@ pub(super) fn is_another_s(config: &Config) -> Option<u32> {
         .and_then(|(theirs, ours)| (theirs != ours).then_some(ours))
 }
 
+/// The folder of services, if its owner keeps it from this user.
+pub(super) fn closed(config: &Config) -> Option<PathBuf> {
+    let folder = as_path(&config.global.service_dir());
+    let is_refused = |error: std::io::Error| error.kind() == std::io::ErrorKind::PermissionDenied;
+    fs::read_dir(&folder).is_err_and(is_refused).then_some(folder)
+}
+
 fn as_path(path: &impl std::fmt::Display) -> PathBuf {
     PathBuf::from(path.to_string())
 }

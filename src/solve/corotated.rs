@@ -16,10 +16,13 @@ use std::time::Duration;
 
 use rayon::prelude::*;
 
-use super::equilibrium::{Choice, Precision, Request, SolveError, Solved, Solver, solve as solve_linear};
+use super::equilibrium::{
+    Choice, Precision, Request, SolveError, Solved, Solver, System, solve_shared as solve_linear,
+};
 use super::linear::NotLinear;
 use super::operator::{Operator, OperatorError, Row};
 use super::order::Order;
+use super::shared::SystemPart;
 use super::stopwatch::Stopwatch;
 use crate::flock::block::{Block, apply, plus};
 use crate::flock::body::Body;
@@ -27,6 +30,7 @@ use crate::flock::law::{Flock, MatrixWeights, Weights};
 use crate::flock::rules::{Corner, Mean, OWN, Rotation, Turn, patch_row};
 use crate::flock::vectors::Vectors;
 use crate::geometry::point::minus;
+use crate::ranks::{Team, added};
 
 /// Newton steps of one increment.
 const MOST_STEPS: usize = 16;
@@ -78,7 +82,7 @@ pub fn is_corotated(flock: &Flock) -> bool {
 
 /// Followers up to which a factorisation is taken: the rows of the tangent differ from particle to particle, which
 /// multigrid on a lattice gains nothing from.
-const DIRECT_UP_TO: usize = 200_000;
+pub const DIRECT_UP_TO: usize = 200_000;
 
 /// The solver of the linear systems, and why.
 ///
@@ -138,6 +142,22 @@ pub fn solve(
     way: &Way<'_>,
     request: &Request,
 ) -> Result<Solved, CorotatedError> {
+    solve_in_parts((flock, body), follows, held_axes, way, request, None)
+}
+
+/// The same of a body of which each rank of the team has a part, and that is all that is given here; all find the same, or fail
+/// alike.
+///
+/// # Errors
+/// As [`solve`].
+pub fn solve_in_parts(
+    (flock, body): (&Flock, &Body),
+    follows: Vec<bool>,
+    held_axes: Vec<[bool; 2]>,
+    way: &Way<'_>,
+    request: &Request,
+    team: Option<&Team>,
+) -> Result<Solved, CorotatedError> {
     let Weights::Matrix(weights) = &flock.weights else {
         return Err(NotLinear::Rule { rule: "a material without its weights".into() }.into());
     };
@@ -148,11 +168,14 @@ pub fn solve(
     if tolerance.is_nan() || tolerance <= 0.0 || tolerance >= 1.0 {
         return Err(SolveError::Tolerance { tolerance }.into());
     }
-    let followers = follows.iter().filter(|&&follows| follows).count();
+    let part = |team: &Team| SystemPart { team: team.clone(), first: body.first(), owned: body.owned() };
+    let part = team.map(part);
+    let own = body.owned().filter(|&i| follows[i]).count();
+    let followers = team.map_or(own, |team| team.sum([own as u64])[0] as usize);
     let (solver, why) = choose(followers, request)?;
     let step = Request { solver: Choice::This(solver), tolerance: OF_A_STEP, ..*request };
     let order = Order::new(body);
-    let rule = Corotated { flock, weights, body, order, follows, held_axes, way, step };
+    let rule = Corotated { flock, weights, body, order, follows, held_axes, way, step, part };
     let mut newton = Newton {
         rule: &rule,
         size: rule.size(),
@@ -189,6 +212,8 @@ struct Corotated<'a> {
     way: &'a Way<'a>,
     /// How a linear system is solved.
     step: Request,
+    /// Where each rank has a part of the body.
+    part: Option<SystemPart>,
 }
 
 /// Force and stiffness of the cells around a particle.
@@ -258,14 +283,19 @@ impl Corotated<'_> {
         self.flock.forces.as_ref().map_or([0.0; 2], |forces| forces.get(i))
     }
 
-    /// The force left on every follower after `part` of the way; zero on the others.
+    /// The force left on every follower after `part` of the way; zero on the others, and on those of a part that see less here
+    /// than in the whole body.
     fn forces(&self, u: &Vectors, part: f64) -> Option<(Vec<Option<Local>>, Vectors)> {
-        let of_particle = |i: usize| match self.follows[i] {
+        let exact = self.body.exact();
+        let of_particle = |i: usize| match self.follows[i] && exact.contains(&i) {
             false => Some(None),
             true => self.local(i, u).map(Some),
         };
-        let locals: Vec<Option<Local>> =
-            (0..u.len()).into_par_iter().map(of_particle).collect::<Option<_>>()?;
+        let locals: Option<Vec<Option<Local>>> = (0..u.len()).into_par_iter().map(of_particle).collect();
+        if self.any(locals.is_none()) {
+            return None;
+        }
+        let locals = locals?;
         let left = |(i, local): (usize, &Option<Local>)| match local {
             None => [0.0; 2],
             Some(local) => {
@@ -290,26 +320,46 @@ impl Corotated<'_> {
             }
             [0, 1].map(|axis| if free[axis] { sum[axis] } else { 0.0 })
         };
-        f64::EPSILON * norm(&locals.iter().enumerate().map(of_particle).collect())
+        f64::EPSILON * self.norm(&locals.iter().enumerate().map(of_particle).collect())
     }
 
     /// The force at the start, all followers at zero and all cells in the axes of the reference.
     fn size(&self) -> f64 {
         let mut u = Vectors::zeros(self.follows.len());
         self.hold(&mut u, &(self.way.held)(1.0));
-        let followers = (0..u.len()).filter(|&i| self.follows[i]);
-        let all: Vectors = followers
-            .map(|i| {
-                let mut force = self.load(i);
-                let others = self.flock.neighbours.of(i).iter().zip(self.weights.stiffness_of(i));
-                for (&j, block) in others {
-                    add(&mut force, apply(block, minus(u.get(j as usize), u.get(i))));
-                }
-                let free = self.free(i);
-                [0, 1].map(|axis| if free[axis] { force[axis] } else { 0.0 })
-            })
-            .collect();
-        norm(&all)
+        let owned = self.body.owned();
+        let force = |i: usize| {
+            if !(self.follows[i] && owned.contains(&i)) {
+                return [0.0; 2];
+            }
+            let mut force = self.load(i);
+            let others = self.flock.neighbours.of(i).iter().zip(self.weights.stiffness_of(i));
+            for (&j, block) in others {
+                add(&mut force, apply(block, minus(u.get(j as usize), u.get(i))));
+            }
+            let free = self.free(i);
+            [0, 1].map(|axis| if free[axis] { force[axis] } else { 0.0 })
+        };
+        self.norm(&(0..u.len()).map(force).collect())
+    }
+
+    /// The norm over the whole body.
+    fn norm(&self, points: &Vectors) -> f64 {
+        let square = |i: usize| {
+            let [x, y] = points.get(i);
+            (self.body.index_after_all(i), [x * x + y * y])
+        };
+        let own = self.body.owned().map(square);
+        let [sum] = match &self.part {
+            None => own.map(|(_, square)| square).fold([0.0], added),
+            Some(part) => part.team.sum_in_order([0.0], own, self.body.has_some_after_all()),
+        };
+        sum.sqrt()
+    }
+
+    /// Whether it is so on any rank.
+    fn any(&self, own: bool) -> bool {
+        self.part.as_ref().map_or(own, |part| part.team.any(own))
     }
 
     /// Second derivatives of the energy, forces per displacement, in the order of a system.
@@ -334,6 +384,22 @@ impl Corotated<'_> {
         let operator = Operator::from_rows_along_outline((&sites[..], outliers), grid, follows, row);
         let operator = operator.map_err(|error| order.error(error))?;
         Ok(operator.with_held_axes(order.by_place(self.held_axes.clone())))
+    }
+
+    /// The system of a step, or of the part of it that is here: the forces that are left, and the leaders' moves.
+    fn system(&self, locals: &[Option<Local>], [left, led]: [Vectors; 2]) -> Result<System, OperatorError> {
+        let own = self.tangent(locals);
+        let whole = |own: Operator| self.order.system(own, [left, led]);
+        let Some(part) = &self.part else { return own.map(whole) };
+        // Neighbours are those of the rule: nothing else can be wrong with a row.
+        let lost = match &own {
+            Err(OperatorError::NotFinite { particle }) => Some([*particle, 0]),
+            _ => None,
+        };
+        match part.first_found(lost) {
+            Some([particle, _]) => Err(OperatorError::NotFinite { particle }),
+            None => Ok(whole(own?).of_part(part.clone())),
+        }
     }
 }
 
@@ -403,7 +469,7 @@ impl Newton<'_> {
             rule.hold(&mut u, &now);
             let Some(found) = rule.forces(&u, after) else { return Ok(None) };
             (locals, left) = found;
-            let residual = norm(&left) / self.size;
+            let residual = rule.norm(&left) / self.size;
             self.residuals.push(residual);
             let rounding = rule.rounding(&locals, &u, after) / self.size;
             tracing::debug!(after, residual, rounding, "a step of Newton's method");
@@ -424,8 +490,8 @@ impl Newton<'_> {
             (Some(a), Some(b)) => a.cosine_to(b.turn) >= LEAST_COSINE,
             _ => true,
         };
-        let arrived = is_settled && turns.iter().zip(&locals).all(near);
-        Ok(arrived.then_some(u))
+        let is_far = rule.any(!turns.iter().zip(&locals).all(near));
+        Ok((is_settled && !is_far).then_some(u))
     }
 
     /// One step of Newton's method, the leaders moving by `led`.
@@ -436,13 +502,13 @@ impl Newton<'_> {
         led: Vectors,
     ) -> Result<(), CorotatedError> {
         let begin = Stopwatch::start();
-        let operator = self.rule.tangent(locals).map_err(NotLinear::Operator)?;
-        let system = self.rule.order.system(operator, [left, led]);
+        let rule = self.rule;
+        let system = rule.system(locals, [left, led]).map_err(NotLinear::Operator)?;
         let assembled = begin.elapsed();
-        let solved = solve_linear(&system, &self.rule.step)?;
+        let solved = solve_linear(&system, &rule.step, rule.part.as_ref().map(|part| &part.team))?;
         self.times[0] += assembled + solved.phases[0].1;
         self.times[1] += solved.phases[1].1;
-        self.last_step = norm(&solved.displacement) / norm(u).max(f64::MIN_POSITIVE);
+        self.last_step = rule.norm(&solved.displacement) / rule.norm(u).max(f64::MIN_POSITIVE);
         for (i, by) in solved.displacement.iter().enumerate() {
             let at = u.get(i);
             u.set(i, [at[0] + by[0], at[1] + by[1]]);
@@ -453,8 +519,4 @@ impl Newton<'_> {
 
 fn add(sum: &mut [f64; 2], [x, y]: [f64; 2]) {
     *sum = [sum[0] + x, sum[1] + y];
-}
-
-fn norm(points: &Vectors) -> f64 {
-    points.iter().map(|[x, y]| x * x + y * y).sum::<f64>().sqrt()
 }

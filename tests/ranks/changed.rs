@@ -65,6 +65,34 @@ fn loads_and_constants_that_change_on_the_way_of_a_material_in_parts_too() {
 }
 
 #[test]
+fn a_body_in_parts_becomes_a_material_or_ceases_to_be_one_as_one_alone_does() {
+    let grid = "body={shape={kind=\"grid\",columns=24,rows=9}}";
+    let second = "neighbours={kind=\"second\"}";
+    // Dilatations are averaged over cells two columns away.
+    let soft = "material={kind=\"isotropic\",young=1000.0,poisson=0.49,plane=\"strain\"}";
+    let wide = "neighbours={kind=\"chebyshev\",radius=2}";
+    let long = "body={shape={kind=\"grid\",columns=160,rows=9}}";
+    let [rigid, loose] = ["material", "barycentre"].map(|kind| format!("rule.mean={{kind={kind:?}}}"));
+    let both = actions(&[
+        &set(12, &[&rigid, "update.damping=0.5"]),
+        &set(30, &[&loose, "rule.feedback={factor=-0.2,reference=\"previous\"}"]),
+    ]);
+    let becomes = actions(&[&set(12, &[&rigid])]);
+    let ceases = actions(&[&set(12, &[&loose])]);
+    for sets in [
+        &[&loose[..], &becomes][..],
+        &[&loose, &both],
+        &[&loose, &becomes, "lattice={kind=\"hexagonal\",spacing=1.0}"],
+        &[&loose, &becomes, soft, wide, long],
+        &[&rigid, &ceases],
+        &[&rigid, &ceases, "lattice={kind=\"hexagonal\",spacing=1.0}"],
+    ] {
+        let sets = [&[grid, second], sets].concat();
+        assert_scene_parted_the_same(&plate(PLATE, &sets), &format!("{sets:?}"), 25);
+    }
+}
+
+#[test]
 fn keys_that_change_on_the_way_are_refused_in_parts_as_they_are_as_a_whole() {
     let nowhere = "loads=[{kind=\"force\",region={kind=\"box\",min=[90,0],max=[95,9]},force=[1,0]}]";
     let loaded = "loads=[{kind=\"body\",force=[0.1,-0.7]}]";
@@ -74,10 +102,16 @@ fn keys_that_change_on_the_way_are_refused_in_parts_as_they_are_as_a_whole() {
     ] {
         assert_refused_the_same(&plate(PLATE, &[&["record.probes=[]"], sets].concat()), what);
     }
-    // Other columns around those of a part decide on it.
+    // Some particles of a disc are at the corner of no cell.
     let rigid = actions(&[&set(9, &["rule.mean={kind=\"material\"}"])]);
-    let barycentre = ["rule.mean.kind=\"barycentre\"", "neighbours={kind=\"second\"}", &rigid];
-    assert_eq!(laid_out_whole_for(&plate(PLATE, &barycentre)).as_deref(), Some("actions"));
+    let loose = "body={outline=\"lattice\",shape={kind=\"disc\",centre=[10.0,5.0],radius=9.0}}";
+    let barycentre = ["rule.mean.kind=\"barycentre\"", "neighbours={kind=\"second\"}", loose];
+    let sets = [&barycentre[..], &[&rigid, "record.probes=[]"]].concat();
+    assert_refused_the_same(&plate(PLATE, &sets), "other particles or neighbours");
+    // Another outline.
+    let loose = "body={shape={kind=\"disc\",centre=[10.0,5.0],radius=9.0}}";
+    let sets = [&barycentre[..2], &[&rigid, loose]].concat();
+    assert_eq!(laid_out_whole_for(&plate(PLATE, &sets)).as_deref(), Some("actions"));
 }
 
 #[test]

@@ -20,11 +20,15 @@ use flockform::solve::interrupt::Interrupt;
 
 use scenes::{load, planned};
 
+mod averaged;
 mod changed;
+mod increments;
 mod parts;
 mod rest;
 #[path = "../common/scenes.rs"]
 mod scenes;
+mod turned;
+mod weighted;
 mod written;
 
 /// Everything that a run leaves, to the bit.

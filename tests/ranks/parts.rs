@@ -14,6 +14,7 @@ use flockform::engine::observer::EachStep;
 use flockform::engine::probes::ProbeSeries;
 use flockform::engine::setup::Setup;
 use flockform::engine::state::EngineState;
+use flockform::flock::action::ActionKind;
 use flockform::flock::lattice::Site;
 use flockform::flock::law::Weights;
 use flockform::flock::vectors::Vectors;
@@ -43,6 +44,15 @@ fn kept_parts(scene: &Scene, step: usize, ranks: usize) -> Option<KeptParts> {
     Some((parts.into_iter().map(|(first, state, ..)| (first, state)).collect(), probes, residual))
 }
 
+/// Those of the start and those that actions change to.
+fn weights(setup: &Setup) -> impl Iterator<Item = &Weights> {
+    let later = setup.actions.iter().filter_map(|action| match &action.what {
+        ActionKind::Follow(conduct) => Some(&conduct.weights),
+        ActionKind::Cut(_) => None,
+    });
+    std::iter::once(&setup.flock.weights).chain(later)
+}
+
 /// Those that a part has exactly see what they see in the whole body, by the same weights, and are loaded alike.
 fn assert_as_in_the_whole(part: &Plan, whole: &Plan) {
     let [part, whole] = [part, whole].map(|plan| &plan.setup);
@@ -56,8 +66,10 @@ fn assert_as_in_the_whole(part: &Plan, whole: &Plan) {
         assert_eq!((part.body.exact_particle(index), part.body.id(i)), (Some(i), index + 1));
         assert_eq!(part.body.reference.get(i), whole.body.reference.get(index));
         assert_eq!(seen(part, i), seen(whole, index), "particle {}", index + 1);
-        if let [Weights::Matrix(part), Weights::Matrix(whole)] = [&part.flock.weights, &whole.flock.weights] {
-            assert_eq!(part.of(i), whole.of(index));
+        for [part, whole] in weights(part).zip(weights(whole)).map(<[&Weights; 2]>::from) {
+            if let [Weights::Matrix(part), Weights::Matrix(whole)] = [part, whole] {
+                assert_eq!(part.of(i), whole.of(index), "particle {}", index + 1);
+            }
         }
         assert_eq!(force(part, i), force(whole, index), "particle {}", index + 1);
     }

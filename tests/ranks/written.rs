@@ -8,10 +8,10 @@ use std::time::Duration;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use flockform::continuum::digest::{digest, digest_of_parts};
+use flockform::continuum::equilibrium::run_to_equilibrium_shared;
 use flockform::continuum::parts::laid_out_whole_for;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::record::LoadStep;
-use flockform::continuum::run::run_shared;
 use flockform::engine::Engine;
 use flockform::engine::observer::Observer;
 use flockform::engine::state::EngineState;
@@ -42,7 +42,8 @@ impl Writer<'_> {
     fn every(&self) -> usize {
         match self.scene.load_steps {
             Some(LoadSteps::Stepped { every, .. }) => every,
-            _ => self.scene.record.vtk_every,
+            Some(LoadSteps::Solved(_)) => 1,
+            None => self.scene.record.vtk_every,
         }
     }
 
@@ -107,7 +108,7 @@ fn write(scene: &Scene, team: Option<&Team>, out: &Path, from: Option<&Path>, le
         frames.map(|folder| VtkSeries::create(folder).expect("created").with_material(scene.material));
     let folder_of = folder.as_ref();
     let mut writer = Writer { scene, team, digest, folder: folder_of, frames, rows, leave_at };
-    let outcome = run_shared(plan, from, team, &mut writer).expect("can be shared");
+    let outcome = run_to_equilibrium_shared(scene, plan, from, team, &mut writer).expect("can be shared");
     if writer.rows.last().is_some_and(|last| last.step != outcome.engine.step()) {
         writer.measure(&outcome.engine);
     }
@@ -130,37 +131,49 @@ fn tables(folder: &Path) -> [String; 3] {
     let summary: serde_json::Value = serde_json::from_str(&read("summary.json")).expect("JSON");
     let mut summary = summary.as_object().expect("an object").clone();
     assert!(["timings", "share_swept"].iter().all(|key| summary.remove(*key).is_some()));
+    if let Some(solved) = summary.get_mut("equilibrium").and_then(serde_json::Value::as_object_mut) {
+        assert!(solved.remove("phases").is_some(), "times");
+    }
     [read("load.csv"), read("final.csv"), format!("{summary:#?}")]
 }
 
-fn assert_written_the_same(scene: &Scene, leave_at: usize) {
+fn in_parts(scene: &Scene, ranks: usize, out: &Path, from: Option<&Path>, leave_at: Option<usize>) {
+    on_ranks(ranks, |team| write(scene, Some(&team), out, from, leave_at));
+}
+
+/// The tables that a run alone writes, which a run in parts does as well.
+pub(super) fn assert_tables_the_same(scene: &Scene) -> [String; 3] {
     assert_eq!(laid_out_whole_for(scene), None);
     let parent = tempfile::tempdir().expect("a folder");
     let of = |name: &str| parent.path().join(name);
-    let in_parts = |ranks: usize, out: &Path, from: Option<&Path>, leave_at: Option<usize>| {
-        on_ranks(ranks, |team| write(scene, Some(&team), out, from, leave_at));
-    };
     write(scene, None, &of("alone"), None, None);
     let expected = tables(&of("alone"));
     assert!(expected[0].lines().count() > 5, "{}", expected[0]);
     for ranks in [1, 2, 3, 5] {
-        in_parts(ranks, &of("parts"), None, None);
+        in_parts(scene, ranks, &of("parts"), None, None);
         assert_eq!(tables(&of("parts")), expected, "{ranks} parts");
     }
-    in_parts(3, &of("left"), None, Some(leave_at));
+    expected
+}
+
+fn assert_written_the_same(scene: &Scene, leave_at: usize) {
+    let expected = assert_tables_the_same(scene);
+    let parent = tempfile::tempdir().expect("a folder");
+    let of = |name: &str| parent.path().join(name);
+    in_parts(scene, 3, &of("left"), None, Some(leave_at));
     assert!(of("left").join(checkpoint::FILE).is_file());
     for ranks in [2, 4] {
-        in_parts(ranks, &of("resumed"), Some(&of("left")), None);
+        in_parts(scene, ranks, &of("resumed"), Some(&of("left")), None);
         assert_eq!(tables(&of("resumed")), expected, "3 parts, then {ranks}");
     }
     write(scene, None, &of("resumed"), Some(&of("left")), None);
     assert_eq!(tables(&of("resumed")), expected, "3 parts, then alone");
     write(scene, None, &of("left"), None, Some(leave_at));
-    in_parts(2, &of("resumed"), Some(&of("left")), None);
+    in_parts(scene, 2, &of("resumed"), Some(&of("left")), None);
     assert_eq!(tables(&of("resumed")), expected, "alone, then 2 parts");
 }
 
-const SEVERAL: &str = "loads=[{kind=\"pressure\",region={kind=\"outline\",hole=1},pressure=9.0},\
+pub(super) const SEVERAL: &str = "loads=[{kind=\"pressure\",region={kind=\"outline\",hole=1},pressure=9.0},\
      {kind=\"force\",region={kind=\"disc\",centre=[17.0,6.0],radius=2.0},force=[0.5,-1.5]},\
      {kind=\"body\",force=[0.1,-0.7]}]";
 
@@ -263,28 +276,32 @@ fn frames_of_a_body_in_parts_are_those_of_a_run_alone_with_their_stresses() {
         &paper,
         &[&paper[..], &[torn]].concat(),
     ] {
-        let scene = plate(PLATE, &[&frames[..], sets].concat());
-        let parent = tempfile::tempdir().expect("a folder");
-        let [alone, parts] = ["alone", "parts"].map(|name| parent.path().join(name));
-        write(&scene, None, &alone, None, None);
-        for ranks in [1, 2, 3, 5] {
-            on_ranks(ranks, |team| write(&scene, Some(&team), &parts, None, None));
-            for step in [0, 20, 40] {
-                let what = format!("{sets:?}, step {step} in {ranks} parts");
-                let (mut expected, mut found) = (Frame::default(), Frame::default());
-                expected.add(&alone.join(format!("steps/step_{step:06}.vtu")));
-                let piece = |rank: usize| parts.join(format!("steps/step_{step:06}_{rank:04}.vtu"));
-                (0..ranks).for_each(|rank| found.add(&piece(rank)));
-                assert!(found.particles == expected.particles, "{what}: particles");
-                assert!(found.cells == expected.cells, "{what}: cells");
-                assert_eq!((found.count, expected.count), (expected.count, found.cells.len()), "{what}");
-                let first = expected.particles.values().next().expect("a particle");
-                assert!(first.contains_key("stress") && first.contains_key("von_mises"), "{what}");
-                let list = parts.join(format!("steps/step_{step:06}.pvtu"));
-                let [list, piece] = [list, piece(0)].map(|path| std::fs::read_to_string(path).expect("text"));
-                let listed = names(&list, ["PPointData", "PCellData"]);
-                assert_eq!(listed, names(&piece, ["PointData", "CellData"]), "{what}");
-            }
+        assert_frames_the_same(&plate(PLATE, &[&frames[..], sets].concat()), &[0, 20, 40]);
+    }
+}
+
+/// The frames of these steps that a run in parts writes are those of a run alone.
+pub(super) fn assert_frames_the_same(scene: &Scene, steps: &[usize]) {
+    let parent = tempfile::tempdir().expect("a folder");
+    let [alone, parts] = ["alone", "parts"].map(|name| parent.path().join(name));
+    write(scene, None, &alone, None, None);
+    for ranks in [1, 2, 3, 5] {
+        on_ranks(ranks, |team| write(scene, Some(&team), &parts, None, None));
+        for step in steps {
+            let what = format!("{}, step {step} in {ranks} parts", scene.name);
+            let (mut expected, mut found) = (Frame::default(), Frame::default());
+            expected.add(&alone.join(format!("steps/step_{step:06}.vtu")));
+            let piece = |rank: usize| parts.join(format!("steps/step_{step:06}_{rank:04}.vtu"));
+            (0..ranks).for_each(|rank| found.add(&piece(rank)));
+            assert!(found.particles == expected.particles, "{what}: particles");
+            assert!(found.cells == expected.cells, "{what}: cells");
+            assert_eq!((found.count, expected.count), (expected.count, found.cells.len()), "{what}");
+            let first = expected.particles.values().next().expect("a particle");
+            assert!(first.contains_key("stress") && first.contains_key("von_mises"), "{what}");
+            let list = parts.join(format!("steps/step_{step:06}.pvtu"));
+            let [list, piece] = [list, piece(0)].map(|path| std::fs::read_to_string(path).expect("text"));
+            let listed = names(&list, ["PPointData", "PCellData"]);
+            assert_eq!(listed, names(&piece, ["PointData", "CellData"]), "{what}");
         }
     }
 }

@@ -1,5 +1,7 @@
 //! What is left in shared memory and in iceoryx2's folders after a clean end, and whether two users get along.
 
+use std::fs::Permissions;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -78,12 +80,20 @@ fn two_users_of_one_computer_both_run() {
         std::thread::sleep(Duration::from_millis(20));
     }
     let folder = temporary();
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        std::fs::set_permissions(folder.path(), std::fs::Permissions::from_mode(0o777)).expect("ours");
-    }
-    let output = publish(folder.path(), Some("65534"), None).output().expect("setpriv is there");
+    let open = |folder: &Path, mode: u32| {
+        std::fs::set_permissions(folder, Permissions::from_mode(mode)).expect("it is this user's");
+    };
+    open(folder.path(), 0o777);
+    let of_another = || publish(folder.path(), Some("65534"), None).output().expect("setpriv is there");
+    let output = of_another();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert_eq!(files("u65534_"), Vec::<PathBuf>::new());
+    // As a program leaves it that is not flockform.
+    let services = Path::new("/tmp/iceoryx2/services");
+    open(services, 0o750);
+    let output = of_another();
+    open(services, 0o1777);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("chmod 1777") && message.contains("/tmp/iceoryx2/services"), "{message}");
 }

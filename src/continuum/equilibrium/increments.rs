@@ -2,9 +2,9 @@
 
 use super::{Observer, Outcome, Plan, StopReason, overflow, steps_of_the_way};
 use super::{
-    farthest_from_target, of_plan_after, reason, refuse, refuse_corotated, solve_corotated, way_after,
+    engine_of, farthest_from_target, reason, refuse, refuse_corotated, shared_system, solve_corotated,
+    way_after,
 };
-use crate::engine::Engine;
 use crate::engine::load::scaled;
 use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
@@ -33,8 +33,10 @@ pub(super) fn settle_each(
 ) -> Result<Outcome, SceneError> {
     let whole = plan.setup.flock.forces.clone();
     let spacing = plan.setup.body.lattice.spacing();
-    let mut engine = Engine::new(plan.setup.clone());
+    let probes = plan.setup.probes.take();
+    let mut engine = engine_of(plan.setup.clone(), team);
     engine.set_load_factor(0.0);
+    engine.begin_probes(probes);
     let mut outcome =
         Outcome { engine, reason: StopReason::Equilibrium, residual: f64::INFINITY, solved: None };
     let mut interrupted = observer.see(&outcome.engine, outcome.residual).is_break();
@@ -60,6 +62,7 @@ pub(super) fn settle_each(
         outcome.engine.place_at_rest(n + 1, &solved.displacement);
         outcome.engine.set_load_factor(part);
         outcome.engine.extend_path();
+        outcome.engine.record_probes();
         outcome.residual = farthest_from_target(&outcome.engine) / spacing;
         outcome.reason = overflow(&outcome.engine).map_or_else(|| reason(&solved), StopReason::Diverged);
         outcome.solved = Some(solved);
@@ -82,7 +85,7 @@ fn settle_at(
     let steps = steps_of_the_way(plan) as f64;
     if !corotated::is_corotated(&plan.setup.flock) {
         plan.setup.flock.forces = whole.map(|whole| scaled(whole, part));
-        let system = of_plan_after(scene, plan, part * steps).map_err(Failure::Refused)?;
+        let system = shared_system(scene, plan, team, part * steps).map_err(Failure::Refused)?;
         return solve_shared(&system, request, team).map_err(|error| match error {
             SolveError::Interrupted => Failure::Interrupted,
             error => Failure::Refused(refuse(scene, &error)),

@@ -27,6 +27,8 @@ pub(super) struct Assembly<'a> {
     /// Over which cells dilatations are averaged.
     pub averaged: Option<Patches<'a>>,
     pub factor: Option<&'a [f64]>,
+    /// The index of a particle in the whole body, in the order of which all is summed.
+    pub index: &'a (dyn Fn(usize) -> usize + Sync),
 }
 
 /// Cells whose dilatations are averaged.
@@ -154,7 +156,7 @@ impl Assembly<'_> {
     fn patches(&self, particle: usize) -> Vec<Patch> {
         let Some(patches) = &self.averaged else { return Vec::new() };
         let mut middles: Vec<usize> = self.around(particle).flat_map(|cell| patches.middles(cell)).collect();
-        middles.sort_unstable();
+        middles.sort_unstable_by_key(|&middle| (self.index)(middle));
         middles.dedup();
         let around = middles.into_iter().flat_map(|middle| patches.around(middle, self.factor));
         let own = |cell: &usize| self.cells.of(*cell).contains(&(particle as u32));

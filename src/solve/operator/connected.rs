@@ -39,6 +39,10 @@ impl Operator {
 
     /// Reaches from those that are reached all those of a range, whole columns, that a chain within it connects to them.
     fn settle(&self, matrix: &Matrix, (of, reached): (Range<usize>, &mut [bool])) {
+        // A part that no other has reached yet waits for them.
+        if !reached.contains(&true) {
+            return;
+        }
         for _ in 0..SWEEPS {
             if !sweep(matrix, &of, reached) {
                 return;
