@@ -18,6 +18,7 @@ const EVEN: &str = "load_steps={increments=4}";
 /// Unloaded in the end.
 const BACK: &str = "load_steps={schedule=[0.5,1.0,0.25,0.0]}";
 const SOFT: &str = "material={kind=\"isotropic\",young=1000.0,poisson=0.49,plane=\"strain\"}";
+const FITTED: &str = "body.outline=\"fitted\"";
 const GRID: &str = "body={shape={kind=\"grid\",columns=24,rows=9}}";
 const PAPER: [&str; 2] = ["rule.mean.kind=\"barycentre\"", "neighbours={kind=\"second\"}"];
 const LED: &str = "{region={kind=\"edge\",side=\"right\",depth=1.5},role=\"leader\",axis=\"x\",\
@@ -57,6 +58,10 @@ fn equilibria_on_the_way_of_a_body_in_parts_have_the_bits_of_those_of_one_alone(
         &[&multigrid, EVEN, inclusion, SEVERAL],
         &[&multigrid, BACK, &pulled, SEVERAL],
         &[&auto, EVEN, whole_cells],
+        &[&multigrid, EVEN, FITTED],
+        &[&auto, BACK, FITTED, SEVERAL, "record.places=[[16.3,5.8],[2.1,5.5]]"],
+        &[&multigrid, BACK, FITTED, &hexagonal, &pulled, SEVERAL],
+        &[&direct, EVEN, FITTED, SOFT, SEVERAL],
         &[&auto, EVEN, SOFT, SEVERAL],
         &[&auto, EVEN, PAPER[0], PAPER[1]],
         &[&auto, BACK, PAPER[0], PAPER[1], GRID, "frame=\"lagged\""],
@@ -82,6 +87,7 @@ fn what_equilibria_on_the_way_leave_is_written_in_parts_as_it_is_alone() {
         &[&multigrid[..], SEVERAL, "load_steps={increments=5}"][..],
         &[&auto, SEVERAL, "load_steps={schedule=[0.2,0.7,1.0,0.5,0.0]}"],
         &[&auto, PAPER[0], PAPER[1], "load_steps={increments=5}"],
+        &[&multigrid, FITTED, SEVERAL, "load_steps={increments=5}"],
     ] {
         assert_tables_the_same(&plate(PLATE, &[&["record.probes=[]"], sets].concat()));
     }

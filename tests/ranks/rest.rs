@@ -1,11 +1,13 @@
 //! The equilibrium of a body of which each rank lays out a part has the bits of one that is laid out as a whole.
 
+use flockform::continuum::equilibrium::run_to_equilibrium_shared;
 use flockform::continuum::parts::laid_out_whole_for;
 use flockform::continuum::plan::Plan;
 
 use super::parts::{PLATE, assert_scene_parted_the_same, plate};
-use super::scenes::load;
-use super::{on_ranks, solved_on};
+use super::scenes::{load, planned};
+use super::written::{SEVERAL, assert_tables_the_same};
+use super::{Looks, on_ranks, solved_on};
 
 /// A scene of the plate whose equilibrium a solver finds.
 fn assert_at_rest_the_same(solver: &str, sets: &[&str]) {
@@ -95,7 +97,9 @@ fn so_has_that_of_a_body_whose_outline_cuts_cells() {
         &[several, places],
         &[inclusion, several],
         &[&hexagonal, inclusion, several, places],
+        &["material={kind=\"isotropic\",young=1000.0,poisson=0.49,plane=\"strain\"}", several],
         &[&honeycomb],
+        &["lattice={kind=\"centred-rectangular\",a=1.5,b=1.1}", several],
         &["lattice={kind=\"rectangular\",a=1.0,b=0.7}"],
         &[oblique, several],
         &[turned],
@@ -144,25 +148,44 @@ fn a_large_equilibrium_along_an_outline_too() {
 }
 
 #[test]
+fn what_a_body_at_rest_leaves_is_written_in_parts_as_it_is_alone() {
+    for outline in ["lattice", "fitted"] {
+        for solver in ["multigrid", "auto", "conjugate-gradients"] {
+            let asked = format!("equilibrium={{solver=\"{solver}\",tolerance=1e-7}}");
+            let outline = format!("body.outline=\"{outline}\"");
+            let sets = [&asked, &outline, SEVERAL, "record={probes=[],places=[[16.3,5.8],[2.1,5.5]]}"];
+            assert_tables_the_same(&plate(PLATE, &sets));
+        }
+    }
+}
+
+#[test]
 fn what_has_no_equilibrium_is_refused_by_all_ranks_with_the_same_words() {
     let asked = "equilibrium={solver=\"multigrid\",tolerance=1e-7}";
+    let fitted = "body.outline=\"fitted\"";
+    // The first column has particles at no site alone, which come after all others in the whole.
+    let beside = "body={outline=\"fitted\",shape={kind=\"rectangle\",min=[-0.5,0.4],max=[22.4,9.3]}}";
+    let hexagonal = "lattice={kind=\"hexagonal\",spacing=1.0}";
+    let rotates = "rule.mean={kind=\"material\",rotation=\"corotated\"}";
     for (what, sets) in [
         ("no particle follows", &["roles=[{region={kind=\"all\"},role=\"clamped\"}]"][..]),
         ("connected to no held particle", &["roles=[]"]),
-        ("connected to no held particle", &["body.outline=\"fitted\"", "roles=[]"]),
+        ("connected to no held particle", &[fitted, "roles=[]"]),
+        ("connected to no held particle", &[fitted, hexagonal, "roles=[]"]),
+        ("connected to no held particle", &[fitted, rotates, "roles=[]"]),
+        ("particle 231 ", &[beside, "roles=[]"]),
         ("not linear", &["rule.mean={kind=\"power\",exponent=2.0}", "neighbours={kind=\"second\"}"]),
     ] {
         let scene = plate(PLATE, &[&[asked, "record.probes=[]"], sets].concat());
-        let words = |ranks: usize| {
-            on_ranks(ranks, |team| {
+        let alone = run_to_equilibrium_shared(&scene, planned(&scene), None, None, &mut Looks::every(1));
+        let alone = alone.expect_err("no equilibrium").to_string();
+        assert!(alone.contains(what), "{what}: {alone}");
+        for ranks in [1, 2, 3, 5] {
+            let words = on_ranks(ranks, |team| {
                 let plan = Plan::of_part(&scene, &team).unwrap_or_else(|error| panic!("{error}"));
                 solved_on(&scene, &plan, &team).expect_err("no equilibrium").to_string()
-            })
-        };
-        let alone = words(1).remove(0);
-        assert!(alone.contains(what), "{what}: {alone}");
-        for ranks in [2, 3, 5] {
-            assert!(words(ranks).iter().all(|one| *one == alone), "{ranks} ranks: {alone}");
+            });
+            assert!(words.iter().all(|one| *one == alone), "{ranks} ranks: {alone}\n{words:?}");
         }
     }
 }

@@ -9,6 +9,7 @@ use super::{on_ranks, solved_on};
 
 const TURNS: &str = "rule.mean={kind=\"material\",rotation=\"corotated\"}";
 const SOFT: &str = "material={kind=\"isotropic\",young=1000.0,poisson=0.49,plane=\"strain\"}";
+const FITTED: &str = "body.outline=\"fitted\"";
 const GRID: &str = "body={shape={kind=\"grid\",columns=24,rows=9}}";
 
 fn asked(solver: &str) -> String {
@@ -45,6 +46,11 @@ fn equilibria_of_corotated_materials_in_parts_have_the_bits_of_those_of_a_whole(
         &[SOFT, SEVERAL],
         &[&rollers, SEVERAL],
         &[whole_cells, &far],
+        &[FITTED],
+        &[FITTED, &far, SEVERAL],
+        &[FITTED, &hexagonal, &far],
+        &[FITTED, SOFT, SEVERAL],
+        &[FITTED, inclusion, &rollers, SEVERAL],
     ] {
         for solver in ["auto", "multigrid"] {
             let asked = asked(solver);
@@ -52,25 +58,31 @@ fn equilibria_of_corotated_materials_in_parts_have_the_bits_of_those_of_a_whole(
             assert_scene_parted_the_same(&plate(PLATE, &sets), &format!("{sets:?}"), 60);
         }
     }
-    let sets = [TURNS, &asked("conjugate-gradients"), record, SEVERAL];
-    assert_scene_parted_the_same(&plate(PLATE, &sets), &format!("{sets:?}"), 60);
+    for outline in ["body.outline=\"lattice\"", FITTED] {
+        let sets = [TURNS, &asked("conjugate-gradients"), record, SEVERAL, outline];
+        assert_scene_parted_the_same(&plate(PLATE, &sets), &format!("{sets:?}"), 60);
+    }
 }
 
 /// Large enough for several ranks to share two levels.
 #[test]
 fn a_large_equilibrium_of_a_corotated_material_too() {
     let fine = "lattice={kind=\"square\",spacing=0.16}";
-    let sets = [TURNS, &asked("multigrid"), fine, "record.probes=[]", &bent([-0.5, 1.5])];
-    assert_scene_parted_the_same(&plate(PLATE, &sets), "large", 60);
+    for outline in ["body.outline=\"lattice\"", FITTED] {
+        let sets = [TURNS, &asked("multigrid"), fine, "record.probes=[]", &bent([-0.5, 1.5]), outline];
+        assert_scene_parted_the_same(&plate(PLATE, &sets), outline, 60);
+    }
 }
 
 #[test]
 fn increments_of_a_corotated_material_in_parts_are_those_of_one_alone() {
     let far = bent([-4.0, 9.0]);
     for load_steps in ["load_steps={increments=5}", "load_steps={schedule=[0.2,0.7,1.0,0.5,0.0]}"] {
-        let sets = [TURNS, &asked("auto"), &far, SEVERAL, load_steps];
-        assert_scene_parted_the_same(&plate(PLATE, &sets), load_steps, 60);
-        assert_tables_the_same(&plate(PLATE, &[&sets[..], &["record.probes=[]"]].concat()));
+        for outline in ["body.outline=\"lattice\"", FITTED] {
+            let sets = [TURNS, &asked("auto"), &far, SEVERAL, load_steps, outline];
+            assert_scene_parted_the_same(&plate(PLATE, &sets), load_steps, 60);
+            assert_tables_the_same(&plate(PLATE, &[&sets[..], &["record.probes=[]"]].concat()));
+        }
     }
 }
 

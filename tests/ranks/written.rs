@@ -125,7 +125,7 @@ fn write(scene: &Scene, team: Option<&Team>, out: &Path, from: Option<&Path>, le
     }
 }
 
-/// The table of the loads, and the summary but for what depends on the clock or on how the work was shared.
+/// The table of the loads, if there is one, and the summary but for what depends on the clock or on how the work was shared.
 fn tables(folder: &Path) -> [String; 3] {
     let read = |file: &str| std::fs::read_to_string(folder.join(file)).expect(file);
     let summary: serde_json::Value = serde_json::from_str(&read("summary.json")).expect("JSON");
@@ -134,7 +134,8 @@ fn tables(folder: &Path) -> [String; 3] {
     if let Some(solved) = summary.get_mut("equilibrium").and_then(serde_json::Value::as_object_mut) {
         assert!(solved.remove("phases").is_some(), "times");
     }
-    [read("load.csv"), read("final.csv"), format!("{summary:#?}")]
+    let loads = std::fs::read_to_string(folder.join("load.csv")).unwrap_or_default();
+    [loads, read("final.csv"), format!("{summary:#?}")]
 }
 
 fn in_parts(scene: &Scene, ranks: usize, out: &Path, from: Option<&Path>, leave_at: Option<usize>) {
@@ -148,7 +149,7 @@ pub(super) fn assert_tables_the_same(scene: &Scene) -> [String; 3] {
     let of = |name: &str| parent.path().join(name);
     write(scene, None, &of("alone"), None, None);
     let expected = tables(&of("alone"));
-    assert!(expected[0].lines().count() > 5, "{}", expected[0]);
+    assert!(scene.load_steps.is_none() || expected[0].lines().count() > 5, "{}", expected[0]);
     for ranks in [1, 2, 3, 5] {
         in_parts(scene, ranks, &of("parts"), None, None);
         assert_eq!(tables(&of("parts")), expected, "{ranks} parts");
