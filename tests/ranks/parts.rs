@@ -209,7 +209,8 @@ pub(super) fn assert_scene_parted_the_same(scene: &Scene, name: &str, every: usi
         assert!(found.probes == expected.probes, "{what}: probes");
         assert!(found.breaks == expected.breaks, "{what}: broken bonds");
         assert_eq!(found.readings, expected.readings, "{what}");
-        assert!(found == expected, "{what}");
+        let first = found.places.iter().zip(&expected.places).position(|(found, expected)| found != expected);
+        assert!(found == expected, "{what}: {first:?} of {}", expected.places.len());
     }
 }
 

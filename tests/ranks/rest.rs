@@ -172,7 +172,7 @@ fn what_has_no_equilibrium_is_refused_by_all_ranks_with_the_same_words() {
         ("connected to no held particle", &["roles=[]"]),
         ("connected to no held particle", &[fitted, "roles=[]"]),
         ("connected to no held particle", &[fitted, hexagonal, "roles=[]"]),
-        ("connected to no held particle", &[fitted, rotates, "roles=[]"]),
+        ("connected to no held particle", &[fitted, rotates, SEVERAL, "roles=[]"]),
         ("particle 231 ", &[beside, "roles=[]"]),
         ("not linear", &["rule.mean={kind=\"power\",exponent=2.0}", "neighbours={kind=\"second\"}"]),
     ] {

@@ -50,7 +50,7 @@ fn equilibria_of_corotated_materials_in_parts_have_the_bits_of_those_of_a_whole(
         &[FITTED, &far, SEVERAL],
         &[FITTED, &hexagonal, &far],
         &[FITTED, SOFT, SEVERAL],
-        &[FITTED, inclusion, &rollers, SEVERAL],
+        &[FITTED, &rollers, SEVERAL],
     ] {
         for solver in ["auto", "multigrid"] {
             let asked = asked(solver);
