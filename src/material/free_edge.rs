@@ -84,7 +84,10 @@ impl FreeEdge {
         let loads: Vec<OutlineLoad> = self.loads.iter().filter_map(outlined).collect();
         let mut edge = Edge { body_force: self.body_force(), ..Edge::default() };
         let finder = Finder::new(outline);
-        for [a, b] in sides {
+        let exact = body.exact();
+        // Where a part ends is no outline.
+        let is_of_body = |side: &[u32; 2]| side.iter().any(|&i| exact.contains(&(i as usize)));
+        for [a, b] in sides.into_iter().filter(is_of_body) {
             let [from, to] = [a, b].map(|i| body.reference.get(i as usize));
             let (place, _) = finder.nearest([0, 1].map(|k| 0.5 * (from[k] + to[k])));
             let piece = outline.piece(place.ring, place.piece);
@@ -103,7 +106,6 @@ impl FreeEdge {
         // Where everything is held no traction is known.
         let is_recovered =
             |(i, place): &(usize, Place)| held[*i] != [true; 2] && !is_inner_corner(outline, place);
-        let exact = body.exact();
         let on_outline = on_outline.filter(|(i, _)| exact.contains(i));
         edge.particles = on_outline.filter(is_recovered).map(|(i, _)| i).collect();
         Some(edge)

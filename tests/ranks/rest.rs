@@ -166,13 +166,11 @@ fn what_has_no_equilibrium_is_refused_by_all_ranks_with_the_same_words() {
     // The first column has particles at no site alone, which come after all others in the whole.
     let beside = "body={outline=\"fitted\",shape={kind=\"rectangle\",min=[-0.5,0.4],max=[22.4,9.3]}}";
     let hexagonal = "lattice={kind=\"hexagonal\",spacing=1.0}";
-    let rotates = "rule.mean={kind=\"material\",rotation=\"corotated\"}";
     for (what, sets) in [
         ("no particle follows", &["roles=[{region={kind=\"all\"},role=\"clamped\"}]"][..]),
         ("connected to no held particle", &["roles=[]"]),
         ("connected to no held particle", &[fitted, "roles=[]"]),
         ("connected to no held particle", &[fitted, hexagonal, "roles=[]"]),
-        ("connected to no held particle", &[fitted, rotates, SEVERAL, "roles=[]"]),
         ("particle 231 ", &[beside, "roles=[]"]),
         ("not linear", &["rule.mean={kind=\"power\",exponent=2.0}", "neighbours={kind=\"second\"}"]),
     ] {
