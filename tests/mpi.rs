@@ -134,7 +134,7 @@ fn equilibria_on_ranks_are_those_of_a_run_alone() {
     let scenes: [(&str, &[&str]); 3] = [
         ("beam-loaded", &LARGE_BEAM),
         ("plate-hole", &["--set", "equilibrium.solver=conjugate-gradients"]),
-        ("elastica", &["--set", "lattice.spacing=0.25", "--set", "load_steps.increments=3"]),
+        ("elastica", &["--set", "lattice.spacing=0.5", "--set", "load_steps.increments=3"]),
     ];
     assert_alike_on_ranks(&folder, &scenes);
 }
@@ -332,7 +332,7 @@ fn a_run_in_parts_writes_the_tables_of_a_run_alone() {
         ("beam-loaded", &[]),
         ("beam-loaded", &LARGE_BEAM),
         ("beam-loaded", &[&LARGE_BEAM[..], &["--set", "load_steps={increments=2}"]].concat()),
-        ("elastica", &["--set", "load_steps={increments=3}"]),
+        ("elastica", &["--set", "lattice.spacing=0.5", "--set", "load_steps={increments=3}"]),
     ] {
         let run = |out: &'static str| [&["run", name, "--out", out][..], &PARTED, more].concat();
         assert_ends_well(&flockform(&run("alone"), folder.path()), name);

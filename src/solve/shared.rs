@@ -78,31 +78,31 @@ pub fn of_each(team: &Team, own: Range<usize>) -> Vec<Range<usize>> {
     all.into_iter().map(|[start, end]| start as usize..end as usize).collect()
 }
 
-/// Has words of particles travel from the ranks that own them to those that want them: `read` the words of some of those here,
-/// `count` how many they are, and `write` those that arrive, its own among them. All are numbered as in the whole.
-pub fn exchanged(
+/// Has words of particles travel from the ranks that own them to others that want them: `read` the words of some of those here,
+/// `count` how many they are, and `write` those that arrive. All are numbered as in the whole. Returns those that this rank owns
+/// and wants.
+fn exchanged(
     team: &Team,
     (owned, wanted): (&[Range<usize>], &[Range<usize>]),
     read: impl Fn(Range<usize>) -> Vec<u64>,
     count: impl Fn(usize) -> usize,
     mut write: impl FnMut(Range<usize>, &[u64]),
-) {
+) -> Range<usize> {
     let rank = team.rank();
     let both = |owner: usize, reader: usize| {
         let (a, b) = (&owned[owner], &wanted[reader]);
-        Some(a.start.max(b.start)..a.end.min(b.end)).filter(|both| !both.is_empty())
+        let start = a.start.max(b.start);
+        start..a.end.min(b.end).max(start)
     };
     let others = || (0..team.count()).filter(|&other| other != rank);
-    let sent: Vec<_> = others().filter_map(|other| Some((other, read(both(rank, other)?)))).collect();
-    let from: Vec<_> = others().filter_map(|other| Some((other, both(other, rank)?))).collect();
+    let some = |of: Range<usize>| Some(of).filter(|of| !of.is_empty());
+    let sent: Vec<_> = others().filter_map(|other| Some((other, read(some(both(rank, other))?)))).collect();
+    let from: Vec<_> = others().filter_map(|other| Some((other, some(both(other, rank))?))).collect();
     let sizes: Vec<_> = from.iter().map(|(other, of)| (*other, count(of.len()))).collect();
     for ((_, of), words) in from.into_iter().zip(team.swap(&sent, &sizes)) {
         write(of, &words);
     }
-    if let Some(own) = both(rank, rank) {
-        let words = read(own.clone());
-        write(own, &words);
-    }
+    both(rank, rank)
 }
 
 /// The vector over the particles that this rank wants, of one that begins with the `first` particle of the whole.
@@ -113,7 +113,7 @@ pub fn moved<T: Real>(
 ) -> Vectors<T> {
     let to_first = wanted[team.rank()].start;
     let mut to = Vectors::zeros(wanted[team.rank()].len());
-    exchanged(
+    let own = exchanged(
         team,
         (owned, wanted),
         |of| {
@@ -131,6 +131,11 @@ pub fn moved<T: Real>(
             put(&mut to.y[of], y);
         },
     );
+    if !own.is_empty() {
+        let (read, write) = (own.start - first..own.end - first, own.start - to_first..own.end - to_first);
+        to.x[write.clone()].copy_from_slice(&from.x[read.clone()]);
+        to.y[write].copy_from_slice(&from.y[read]);
+    }
     to
 }
 
