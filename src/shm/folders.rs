@@ -49,7 +49,7 @@ impl Drop for Folders {
             let counters = names(Path::new(SHARED_MEMORY)).into_iter().filter(|name| self.is_counter(name));
             counters.for_each(|name| drop(fs::remove_file(Path::new(SHARED_MEMORY).join(name))));
         }
-        // One with files in it is in use. Of one who has joined there is a node before there is a service.
+        // One with files in it is in use. Of a peer that has joined there is a node before there is a service.
         let _ = self.folders.iter().rev().try_for_each(fs::remove_dir);
     }
 }
