@@ -196,7 +196,8 @@ pub(super) fn assert_scene_parted_the_same(scene: &Scene, name: &str, every: usi
     // One that is put to rest at once is not begun and gone on with.
     let kept = if scene.equilibrium.is_none() { kept_parts(scene, every, 3) } else { None };
     let begun = [1, 2, 3, 5, 8].map(|ranks| (ranks, None));
-    for (ranks, from) in begun.into_iter().chain([(2, kept.as_ref()), (4, kept.as_ref())]) {
+    let resumed = kept.iter().flat_map(|kept| [2, 4].map(|ranks| (ranks, Some(kept))));
+    for (ranks, from) in begun.into_iter().chain(resumed) {
         let found = End { seen: Vec::new(), ..parted(scene, every, ranks, from) };
         let from = from.map_or("", |_| ", begun in 3");
         let what = format!("{name} in {ranks} parts{from}");
