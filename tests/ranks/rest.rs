@@ -9,6 +9,25 @@ use super::scenes::{load, planned};
 use super::written::{SEVERAL, assert_tables_the_same};
 use super::{Looks, on_ranks, solved_on};
 
+/// Loads of every kind.
+const LOADS: &str = "loads=[{kind=\"pressure\",region={kind=\"outline\",hole=1},pressure=9.0},\
+     {kind=\"traction\",region={kind=\"edge\",side=\"top\",depth=4.0},traction=[2.0,7.0],\
+     profile={from=[0.0,0.0],to=[20.0,1.0],factors=[0.5,1.5]}},\
+     {kind=\"force\",region={kind=\"disc\",centre=[17.0,6.0],radius=2.0},force=[0.5,-1.5]},\
+     {kind=\"body\",force=[0.1,-0.7]}]";
+
+/// A side that is kept from moving along an axis.
+fn held(side: &str, axis: &str) -> String {
+    format!("{{region={{kind=\"edge\",side=\"{side}\",depth=1.5}},role=\"clamped\",axis=\"{axis}\"}}")
+}
+
+/// A quarter of a body that is pulled.
+fn pulled() -> String {
+    let led = "{region={kind=\"edge\",side=\"right\",depth=1.5},role=\"leader\",axis=\"x\",\
+         motion={kind=\"keyframes\",frames=[{step=20,displacement=[0.8,0.0]}]}}";
+    format!("roles=[{},{},{led}]", held("left", "x"), held("bottom", "y"))
+}
+
 /// A scene of the plate whose equilibrium a solver finds.
 fn assert_at_rest_the_same(solver: &str, sets: &[&str]) {
     let asked = format!("equilibrium={{solver=\"{solver}\",tolerance=1e-7}}");
@@ -24,33 +43,23 @@ fn the_equilibrium_of_a_body_in_parts_has_the_bits_of_one_laid_out_as_a_whole() 
     let [hexagonal, honeycomb] = ["hexagonal", "honeycomb"].map(lattice);
     let inclusion = "body.inclusions=[{shape={kind=\"disc\",centre=[14.0,6.0],radius=3.1},\
          material={kind=\"isotropic\",young=9000.0,poisson=0.2}}]";
-    let several = "loads=[{kind=\"pressure\",region={kind=\"outline\",hole=1},pressure=9.0},\
-         {kind=\"traction\",region={kind=\"edge\",side=\"top\",depth=4.0},traction=[2.0,7.0],\
-         profile={from=[0.0,0.0],to=[20.0,1.0],factors=[0.5,1.5]}},\
-         {kind=\"force\",region={kind=\"disc\",centre=[17.0,6.0],radius=2.0},force=[0.5,-1.5]},\
-         {kind=\"body\",force=[0.1,-0.7]}]";
     let places = "record={places=[[16.3,5.8],[2.1,5.5],[20.9,5.0],[12.0,6.0]]}";
-    let held = |side: &str, axis: &str| {
-        format!("{{region={{kind=\"edge\",side=\"{side}\",depth=1.5}},role=\"clamped\",axis=\"{axis}\"}}")
-    };
-    let led = "{region={kind=\"edge\",side=\"right\",depth=1.5},role=\"leader\",axis=\"x\",\
-         motion={kind=\"keyframes\",frames=[{step=20,displacement=[0.8,0.0]}]}}";
     let rollers = format!("roles=[{},{}]", held("left", "x"), held("bottom", "y"));
-    let pulled = format!("roles=[{},{},{led}]", held("left", "x"), held("bottom", "y"));
+    let pulled = pulled();
     let whole_cells = "body={outline=\"fitted\",shape={kind=\"rectangle\",max=[22,9]}}";
     for sets in [
         &[][..],
-        &[several, places],
+        &[LOADS, places],
         &[grid],
-        &[&hexagonal, several],
+        &[&hexagonal, LOADS],
         &[&honeycomb],
         &[&honeycomb, grid],
         &["lattice={kind=\"rectangular\",a=1.0,b=0.7}"],
-        &["lattice={kind=\"centred-rectangular\",a=1.5,b=1.1}", several],
+        &["lattice={kind=\"centred-rectangular\",a=1.5,b=1.1}", LOADS],
         &["lattice={kind=\"oblique\",a=1.0,b=0.9,angle=70.0}"],
-        &[inclusion, several],
-        &["material.poisson=0.49", several],
-        &[&rollers, several],
+        &[inclusion, LOADS],
+        &["material.poisson=0.49", LOADS],
+        &[&rollers, LOADS],
         &[&pulled, places],
         &[grid, &pulled],
         &[whole_cells, places],
@@ -59,7 +68,7 @@ fn the_equilibrium_of_a_body_in_parts_has_the_bits_of_one_laid_out_as_a_whole() 
         assert_at_rest_the_same("auto", sets);
     }
     for solver in ["conjugate-gradients", "direct", "jacobi", "gauss-seidel", "chebyshev"] {
-        assert_at_rest_the_same(solver, &[several, &pulled]);
+        assert_at_rest_the_same(solver, &[LOADS, &pulled]);
     }
 }
 
@@ -77,44 +86,34 @@ fn so_has_that_of_a_body_whose_outline_cuts_cells() {
          {kind=\"disc\",centre=[100.2,5.9],radius=1.3}]}";
     // Sides along columns that stand at no site.
     let beside = "body={shape={kind=\"rectangle\",min=[-0.3,0.4],max=[22.4,9.3]}}";
-    let several = "loads=[{kind=\"pressure\",region={kind=\"outline\",hole=1},pressure=9.0},\
-         {kind=\"traction\",region={kind=\"edge\",side=\"top\",depth=4.0},traction=[2.0,7.0],\
-         profile={from=[0.0,0.0],to=[20.0,1.0],factors=[0.5,1.5]}},\
-         {kind=\"force\",region={kind=\"disc\",centre=[17.0,6.0],radius=2.0},force=[0.5,-1.5]},\
-         {kind=\"body\",force=[0.1,-0.7]}]";
     let places = "record={places=[[16.3,5.8],[2.1,5.5],[20.9,5.0],[12.0,8.0]]}";
-    let held = |side: &str, axis: &str| {
-        format!("{{region={{kind=\"edge\",side=\"{side}\",depth=1.5}},role=\"clamped\",axis=\"{axis}\"}}")
-    };
-    let led = "{region={kind=\"edge\",side=\"right\",depth=1.5},role=\"leader\",axis=\"x\",\
-         motion={kind=\"keyframes\",frames=[{step=20,displacement=[0.8,0.0]}]}}";
-    let pulled = format!("roles=[{},{},{led}]", held("left", "x"), held("bottom", "y"));
+    let pulled = pulled();
     let at_rest = |solver: &str, sets: &[&str]| {
         assert_at_rest_the_same(solver, &[&["body.outline=\"fitted\""], sets].concat());
     };
     for sets in [
         &[][..],
-        &[several, places],
-        &[inclusion, several],
-        &[&hexagonal, inclusion, several, places],
-        &["material={kind=\"isotropic\",young=1000.0,poisson=0.49,plane=\"strain\"}", several],
+        &[LOADS, places],
+        &[inclusion, LOADS],
+        &[&hexagonal, inclusion, LOADS, places],
+        &["material={kind=\"isotropic\",young=1000.0,poisson=0.49,plane=\"strain\"}", LOADS],
         &[&honeycomb],
-        &["lattice={kind=\"centred-rectangular\",a=1.5,b=1.1}", several],
+        &["lattice={kind=\"centred-rectangular\",a=1.5,b=1.1}", LOADS],
         &["lattice={kind=\"rectangular\",a=1.0,b=0.7}"],
-        &[oblique, several],
+        &[oblique, LOADS],
         &[turned],
         &[turned, &hexagonal],
-        &[long, several],
-        &[long, several, oblique],
+        &[long, LOADS],
+        &[long, LOADS, oblique],
         &[long, &honeycomb],
         &[beside, &pulled],
-        &[&pulled, several, places],
+        &[&pulled, LOADS, places],
     ] {
         at_rest("multigrid", sets);
         at_rest("auto", sets);
     }
     for solver in ["conjugate-gradients", "direct", "jacobi", "gauss-seidel", "chebyshev"] {
-        at_rest(solver, &[several, &pulled]);
+        at_rest(solver, &[LOADS, &pulled]);
     }
 }
 
