@@ -199,7 +199,12 @@ pub fn of_plan(scene: &Scene, plan: &Plan) -> Result<System, SceneError> {
 }
 
 /// The same with the leaders where they are after so many steps; of a body in parts this rank's, which all have or none.
-fn shared_system(scene: &Scene, plan: &Plan, team: Option<&Team>, steps: f64) -> Result<System, SceneError> {
+pub(crate) fn shared_system(
+    scene: &Scene,
+    plan: &Plan,
+    team: Option<&Team>,
+    steps: f64,
+) -> Result<System, SceneError> {
     let (body, own) = (&plan.setup.body, of_plan_after(scene, plan, steps));
     let Some(team) = team.filter(|_| body.part.is_some()) else { return own };
     let part = SystemPart { team: team.clone(), first: body.first(), owned: body.owned() };

@@ -36,6 +36,8 @@ const MATERIAL: &str = "material={kind=\"isotropic\",young=1000.0,poisson=0.3}";
 const BY_MATERIAL: &str = "rule.mean={kind=\"material\"}";
 const COROTATED: &str = "rule.mean={kind=\"material\",rotation=\"corotated\"}";
 const CELLS: &str = "neighbours={kind=\"cells\"}";
+/// Sweeps of a corotated material are costly.
+const SMALLER: &str = "body.shape.radius=5.5";
 const SWEPT: [&str; 2] = ["stop.tolerance=1e-13", "stop.steps=200000"];
 
 /// Lattices of the bundled scenes `lattice-*`, stretched, sheared and turned by their boundary.
@@ -104,7 +106,7 @@ fn a_body_turned_by_a_right_angle_is_not_strained_by_the_corotated_rule() {
     for lattice in ["square", "hexagonal", "honeycomb"] {
         let name = format!("lattice-{lattice}");
         for how in ["stop.tolerance=1e-14", "equilibrium={tolerance=1e-13}"] {
-            let overrides = [MATERIAL, COROTATED, CELLS, &roles, how, "stop.steps=100000"];
+            let overrides = [MATERIAL, COROTATED, CELLS, SMALLER, &roles, how, "stop.steps=100000"];
             let outcome = ended(&load(&name, &overrides));
             let engine = &outcome.engine;
             for i in 0..engine.body().count() {
@@ -124,7 +126,11 @@ fn a_corotated_material_is_solved_to_where_it_is_swept_on_every_lattice() {
                 role=\"leader\",motion={kind=\"affine\",about=[0.0,4.0],rotate=50.0,stretch=[1.02,1.01],steps=60}}]";
     let pushed = "loads=[{kind=\"body\",force=[1.0,-2.0]}]";
     for lattice in LATTICES {
-        assert_alike(&format!("lattice-{lattice}"), &[MATERIAL, COROTATED, CELLS, bent, pushed], 1e-8);
+        assert_alike(
+            &format!("lattice-{lattice}"),
+            &[MATERIAL, COROTATED, CELLS, SMALLER, bent, pushed],
+            1e-8,
+        );
     }
 }
 
@@ -205,7 +211,11 @@ fn loads_turn_a_corotated_cantilever_less_than_they_stretch_the_small_strain_one
         let roles = "roles=[{region={kind=\"edge\",side=\"left\"},role=\"clamped\"}]";
         let load = "loads=[{kind=\"traction\",region={kind=\"edge\",side=\"right\"},traction=[0.0,-6.0]}]";
         let shape = "body.shape={kind=\"grid\",columns=21,rows=3}";
-        load_with("lattice-square", &[MATERIAL, &mean, CELLS, roles, load, shape], &SWEPT)
+        load_with(
+            "lattice-square",
+            &[MATERIAL, &mean, CELLS, roles, load, shape],
+            &["stop.tolerance=1e-9", SWEPT[1]],
+        )
     };
     let length = |outcome: &Outcome| {
         let present = outcome.engine.present();

@@ -130,7 +130,7 @@ fn assert_same(name: &str, sets: &[&str], every: usize) {
 fn assert_scene_the_same(scene: &Scene, name: &str, every: usize) {
     let (plan, expected) = (planned(scene), alone(scene, every));
     assert!(expected.step > 5, "{name}: something happens");
-    for ranks in 1..=7 {
+    for ranks in [1, 2, 3, 7] {
         for (rank, end) in shared(&plan, every, ranks).into_iter().enumerate() {
             let what = format!("{name}, rank {rank} of {ranks}");
             assert_eq!((end.step, &end.reason), (expected.step, &expected.reason), "{what}");
@@ -468,7 +468,7 @@ fn multigrid_that_ranks_share_has_the_same_bits() {
 fn conjugate_gradients_that_ranks_share_have_the_same_bits() {
     let sets = [&LARGE_BEAM[..2], &["equilibrium.solver=conjugate-gradients", "equilibrium.tolerance=0.05"]]
         .concat();
-    assert_rests_the_same("beam-loaded", &sets, "conjugate-gradients", &[2, 7]);
+    assert_rests_the_same("beam-loaded", &sets, "conjugate-gradients", &[3]);
 }
 
 #[test]

@@ -189,13 +189,19 @@ pub(super) fn assert_parted_the_same(name: &str, sets: &[&str], every: usize) {
     assert_scene_parted_the_same(&load(name, sets), &format!("{name} {sets:?}"), every);
 }
 
+/// Two numbers of ranks for a scene, which differ from scene to scene: those of one test are tried on all of them.
+fn ranks_for(name: &str) -> [usize; 2] {
+    let sum: usize = name.bytes().map(usize::from).sum();
+    [[2, 8], [3, 5], [1, 3], [2, 5]][sum % 4]
+}
+
 pub(super) fn assert_scene_parted_the_same(scene: &Scene, name: &str, every: usize) {
     let (probes, (readings, stresses)) = probed(scene);
     let mut expected = End { seen: Vec::new(), probes, readings, ..alone(scene, every) };
     expected.places.extend(stresses.into_iter().flatten());
     // One that is put to rest at once is not begun and gone on with.
     let kept = if scene.equilibrium.is_none() { kept_parts(scene, every, 3) } else { None };
-    let begun = [1, 2, 3, 5, 8].map(|ranks| (ranks, None));
+    let begun = ranks_for(name).map(|ranks| (ranks, None));
     let resumed = kept.iter().flat_map(|kept| [2, 4].map(|ranks| (ranks, Some(kept))));
     for (ranks, from) in begun.into_iter().chain(resumed) {
         let found = End { seen: Vec::new(), ..parted(scene, every, ranks, from) };

@@ -109,7 +109,7 @@ where
         .expect("a client")
 }
 
-/// Asks, and asks again every two seconds: a request sent before discovery is lost. `tick` serves.
+/// Asks, and asks again five times a second: a request sent before discovery is lost. `tick` serves.
 pub fn call<S: ServiceType>(
     client: &ForeignClient<S>,
     request: &S::Request,
@@ -120,7 +120,7 @@ where
 {
     let mut sent: Vec<(RmwRequestId, Instant)> = Vec::new();
     until("an answer", || {
-        if sent.last().is_none_or(|(_, at)| at.elapsed() > Duration::from_secs(2)) {
+        if sent.last().is_none_or(|(_, at)| at.elapsed() > Duration::from_millis(200)) {
             sent.push((client.send_request(Foreign(request.clone())).expect("sent"), Instant::now()));
         }
         tick();

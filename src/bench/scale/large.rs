@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::super::grid::plan;
 use super::super::machine::median;
 use super::ranks::{engine, on_threads, single, step};
-use crate::continuum::equilibrium::of_plan;
+use crate::continuum::equilibrium::shared_system;
 use crate::continuum::plan::Plan;
 use crate::engine::Engine;
 use crate::ranks::Team;
@@ -140,17 +140,19 @@ pub(super) fn at_rest(
     ranks: usize,
     team: Option<&Team>,
 ) -> Result<AtRest, ThreadPoolBuildError> {
-    let system = plate(effort.solved);
     let request = Request { solver: Choice::This(Solver::Multigrid), ..Request::default() };
-    let solve = |team: Option<&Team>| {
-        let solved = solve_shared(&system, &request, team);
+    let solve = |system: &System, team: Option<&Team>| {
+        let solved = solve_shared(system, &request, team);
         solved
             .unwrap_or_else(|error| panic!("the benchmark's own plate has no equilibrium: {error}"))
             .iterations
     };
     let work = |team: &Team| {
+        let whole = team.is_first().then(|| plate(effort.solved, None));
+        let part = plate(effort.solved, Some(team));
         let (mut of_one, mut of_all) = (0, 0);
-        let times = in_turns(team, effort.turns, || of_one = solve(None), || of_all = solve(Some(team)));
+        let mut alone = || of_one = solve(whole.as_ref().expect("the first rank has it"), None);
+        let times = in_turns(team, effort.turns, &mut alone, || of_all = solve(&part, Some(team)));
         (times, [of_one, of_all])
     };
     let ([alone_seconds, seconds], [alone_iterations, iterations]) = on(ranks, team, work)?;
@@ -159,7 +161,8 @@ pub(super) fn at_rest(
     Ok(AtRest { ranks, body, iterations, alone_iterations, seconds, alone_seconds, speed_up })
 }
 
-fn plate(cells: usize) -> System {
+/// The whole plate, or of a team the part of this rank.
+fn plate(cells: usize, team: Option<&Team>) -> System {
     let text = format!(
         r#"
 title = "A plate that is pulled"
@@ -173,6 +176,10 @@ equilibrium = {{ solver = "multigrid" }}
 "#
     );
     let scene = Scene::parse("plate", "plate", &text, &[], None);
-    let system = scene.and_then(|scene| of_plan(&scene, &Plan::new(&scene)?));
+    let of_scene = |scene: Scene| {
+        let plan = team.map_or_else(|| Plan::new(&scene), |team| Plan::of_part(&scene, team))?;
+        shared_system(&scene, &plan, team, plan.stop.steps as f64)
+    };
+    let system = scene.and_then(of_scene);
     system.unwrap_or_else(|error| panic!("the benchmark's own scene is refused: {error}"))
 }
