@@ -4,6 +4,10 @@ mod cli;
 
 use std::process::ExitCode;
 
+#[cfg(target_os = "linux")]
+#[global_allocator]
+static ALLOCATOR: cli::memory::LargePages = cli::memory::LargePages;
+
 fn main() -> ExitCode {
     let done = cli::arguments().and_then(|(arguments, ros)| {
         cli::spare_memory(&arguments.command);

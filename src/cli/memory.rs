@@ -1,5 +1,7 @@
 //! The memory that is there, and bodies that are too large for it.
 
+#[cfg(target_os = "linux")]
+use std::alloc::{GlobalAlloc, Layout, System};
 use std::fs::read_to_string;
 use std::path::Path;
 
@@ -65,6 +67,54 @@ pub fn return_what_is_dropped() {
     #[cfg(all(feature = "ros", target_env = "gnu"))]
     unsafe {
         libc::mallopt(libc::M_MMAP_THRESHOLD, LARGE);
+    }
+}
+
+/// The system's allocator, which asks for large pages where an array fills several of them: the system sets up a page when it is
+/// first touched, and many give large ones only to what asks.
+#[cfg(target_os = "linux")]
+pub struct LargePages;
+
+#[cfg(target_os = "linux")]
+impl LargePages {
+    /// Bytes of a large page, and of the pages that a mapping begins with \[B\].
+    const PAGES: [usize; 2] = [1 << 21, 1 << 12];
+
+    fn asked(array: *mut u8, bytes: usize) -> *mut u8 {
+        let [large, small] = Self::PAGES;
+        if !array.is_null() && bytes >= large {
+            // An array of a mapping of its own begins behind the few bytes that the allocator keeps there.
+            let before = array.addr() % small;
+            let page = array.wrapping_sub(before).cast();
+            // SAFETY: these are pages of this process, whose contents the advice leaves; where a system has no large pages the
+            // call fails and changes nothing.
+            unsafe { libc::madvise(page, before + bytes, libc::MADV_HUGEPAGE) };
+        }
+        array
+    }
+}
+
+// SAFETY: all is done by the system's allocator, on the same conditions.
+#[cfg(target_os = "linux")]
+unsafe impl GlobalAlloc for LargePages {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: as the caller's.
+        Self::asked(unsafe { System.alloc(layout) }, layout.size())
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: as the caller's.
+        Self::asked(unsafe { System.alloc_zeroed(layout) }, layout.size())
+    }
+
+    unsafe fn realloc(&self, array: *mut u8, layout: Layout, bytes: usize) -> *mut u8 {
+        // SAFETY: as the caller's.
+        Self::asked(unsafe { System.realloc(array, layout, bytes) }, bytes)
+    }
+
+    unsafe fn dealloc(&self, array: *mut u8, layout: Layout) {
+        // SAFETY: as the caller's.
+        unsafe { System.dealloc(array, layout) }
     }
 }
 

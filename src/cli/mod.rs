@@ -13,7 +13,7 @@ mod live;
 pub mod log;
 mod log_writer;
 mod material;
-mod memory;
+pub mod memory;
 mod names;
 mod node;
 mod output;

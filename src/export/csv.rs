@@ -7,9 +7,11 @@
 //! material, which were along x and y in the reference configuration. Numbers are the shortest that read back as the same.
 
 use std::io::{self, BufWriter, Write};
+use std::ops::Range;
 use std::path::PathBuf;
 
 use csv::{Writer, WriterBuilder};
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::OutputFolder;
@@ -93,25 +95,24 @@ pub(super) fn write_final(
     stresses: Option<&[Option<StressState>]>,
 ) -> Result<Option<PathBuf>, ExportError> {
     let (body, team) = (engine.body(), engine.parted());
+    let rows = FinalRows::new(engine, stresses);
     // Those along an outline come after all others, in their own order.
     let last = body.owned().filter(|&i| body.index_after_all(i).is_some()).count();
-    let (mut rows, mut last) = {
-        let before = body.owned().len() - last;
-        (final_rows(engine, stresses).take(before).peekable(), final_rows(engine, stresses).skip(before))
-    };
+    let all = body.owned().len();
+    let (before, last) = (pieces(0..all - last), all - last..all);
     let Some(folder) = folder else {
         let Some(team) = team else { return Ok(None) };
-        while rows.peek().is_some() {
-            team.send_bytes(&text_of(rows.by_ref().take(ROWS_OF_A_PIECE)).unwrap_or_default());
+        for piece in before {
+            team.send_bytes(&rows.text(piece, false).unwrap_or_default());
         }
         team.send_bytes(&[]);
-        let _ = sorted(team, &mut last);
+        let _ = sorted(team, &rows, last);
         return Ok(None);
     };
     let path = folder.path("final.csv");
     let mut file = create(&path).and_then(|file| {
         let mut file = BufWriter::new(file);
-        write_rows(Writer::from_writer(&mut file), rows).map(|()| file)
+        rows.write(before, &mut file).map(|()| file)
     });
     // What the others send is received in any case: they wait until it is.
     for (team, rank) in team.iter().flat_map(|team| (1..team.count()).map(move |rank| (team, rank))) {
@@ -123,29 +124,28 @@ pub(super) fn write_final(
             file = file.and_then(|mut file| file.write_all(&piece).map(|()| file));
         }
     }
-    let last = team.map_or_else(Vec::new, |team| sorted(team, &mut last));
+    let last = team.map_or_else(Vec::new, |team| sorted(team, &rows, last));
     file.and_then(|mut file| file.write_all(&last).and_then(|()| file.flush()))
         .map_err(ExportError::io("write", &path))?;
     Ok(Some(path))
 }
 
-/// Rows that a rank sends at once.
-const ROWS_OF_A_PIECE: usize = 1 << 13;
+/// Rows that a thread makes text of, or a rank sends, at once.
+const ROWS_OF_A_PIECE: usize = 1 << 12;
+
+fn pieces(rows: Range<usize>) -> Vec<Range<usize>> {
+    let from = rows.clone().step_by(ROWS_OF_A_PIECE);
+    from.map(|start| start..rows.end.min(start + ROWS_OF_A_PIECE)).collect()
+}
 
 /// These rows of all ranks, in the order of their ids.
-fn sorted(team: &Team, own: impl Iterator<Item = FinalRow>) -> Vec<u8> {
-    let all = team.each_bytes(&text_of(own).unwrap_or_default()).concat();
+fn sorted(team: &Team, rows: &FinalRows<'_>, own: Range<usize>) -> Vec<u8> {
+    let all = team.each_bytes(&rows.text(own, false).unwrap_or_default()).concat();
     let mut lines: Vec<&[u8]> = all.split_inclusive(|&byte| byte == b'\n').collect();
     let digits = |line: &&[u8]| line.iter().take_while(|byte| byte.is_ascii_digit()).count();
     // Without zeros before them, the shorter number is the smaller one.
     lines.sort_by_key(|line| (digits(line), *line));
     lines.concat()
-}
-
-fn text_of(rows: impl Iterator<Item = FinalRow>) -> io::Result<Vec<u8>> {
-    let mut text = Vec::new();
-    write_rows(WriterBuilder::new().has_headers(false).from_writer(&mut text), rows)?;
-    Ok(text)
 }
 
 fn write_rows(mut writer: Writer<impl Write>, rows: impl Iterator<Item = impl Serialize>) -> io::Result<()> {
@@ -156,40 +156,76 @@ fn write_rows(mut writer: Writer<impl Write>, rows: impl Iterator<Item = impl Se
 }
 
 /// A row for each particle of the body; of a part, for each of its own.
-fn final_rows(engine: &Engine, stresses: Option<&[Option<StressState>]>) -> impl Iterator<Item = FinalRow> {
-    let body = engine.body();
-    let stress = move |i: usize, k: usize| stresses.map(|all| all[i].map(|stress| stress.components[k]));
-    let of_lattice = move |i: usize| body.numbering.is_none() && body.sites[i][0] != Body::ALONG_OUTLINE;
-    let at_sites = (0..body.count()).filter(|&i| of_lattice(i)).map(|i| body.sites[i]);
-    let lowest = |axis: usize| at_sites.clone().map(|site| site[axis]).min().unwrap_or(0);
-    let lowest = body.part.as_ref().map_or_else(|| [lowest(0), lowest(1)], |part| part.whole.lowest);
-    let [first_column, first_row] = lowest.map(i64::from);
-    // Energies and strains are found as they are written: all of them at once would take as much memory as the body.
-    let order = body.part.as_ref().map(|_| body.owned_in_order());
-    let rows = body
-        .owned()
-        .enumerate()
-        .map(move |(n, row)| order.as_ref().map_or_else(|| body.in_row(row), |order| order[n]));
-    rows.map(|i| (i, engine.strain(i))).map(move |(i, strain)| FinalRow {
-        id: body.id(i),
-        column: of_lattice(i).then(|| i64::from(body.sites[i][0]) - first_column + 1),
-        row: of_lattice(i).then(|| i64::from(body.sites[i][1]) - first_row + 1),
-        role: engine.roles()[i].name(),
-        reference_x: body.reference.x[i],
-        reference_y: body.reference.y[i],
-        x: engine.present().x[i],
-        y: engine.present().y[i],
-        pe1: engine.pe1(i),
-        pe2: engine.pe2(i),
-        strain_xx: strain.map(|strain| strain.components[0]),
-        strain_yy: strain.map(|strain| strain.components[1]),
-        strain_xy: strain.map(|strain| strain.components[2]),
-        rotation: strain.map(|strain| strain.rotation),
-        stress_xx: stress(i, 0),
-        stress_yy: stress(i, 1),
-        stress_xy: stress(i, 2),
-        von_mises: stresses.map(|all| all[i].map(|stress| stress.von_mises)),
-    })
+struct FinalRows<'a> {
+    engine: &'a Engine,
+    stresses: Option<&'a [Option<StressState>]>,
+    first_column: i64,
+    first_row: i64,
+    /// Of a part: its particles in the order of the whole body.
+    order: Option<Vec<usize>>,
+}
+
+impl<'a> FinalRows<'a> {
+    fn new(engine: &'a Engine, stresses: Option<&'a [Option<StressState>]>) -> Self {
+        let body = engine.body();
+        let at_sites = (0..body.count()).filter(|&i| is_of_lattice(body, i)).map(|i| body.sites[i]);
+        let lowest = |axis: usize| at_sites.clone().map(|site| site[axis]).min().unwrap_or(0);
+        let lowest = body.part.as_ref().map_or_else(|| [lowest(0), lowest(1)], |part| part.whole.lowest);
+        let [first_column, first_row] = lowest.map(i64::from);
+        let order = body.part.as_ref().map(|_| body.owned_in_order());
+        Self { engine, stresses, first_column, first_row, order }
+    }
+
+    /// Writes pieces of them, of which as many are made at once as there are threads.
+    fn write(&self, pieces: Vec<Range<usize>>, to: &mut impl Write) -> io::Result<()> {
+        for some in pieces.chunks(rayon::current_num_threads().max(1)) {
+            let text = |rows: &Range<usize>| self.text(rows.clone(), rows.start == 0);
+            let texts: Vec<_> = some.par_iter().map(text).collect();
+            texts.into_iter().try_for_each(|text| to.write_all(&text?))?;
+        }
+        Ok(())
+    }
+
+    fn text(&self, rows: Range<usize>, has_headers: bool) -> io::Result<Vec<u8>> {
+        let mut text = Vec::new();
+        let writer = WriterBuilder::new().has_headers(has_headers).from_writer(&mut text);
+        write_rows(writer, rows.map(|n| self.row(n)))?;
+        Ok(text)
+    }
+
+    /// Energies and strains are found as they are written: all of them at once would take as much memory as the body.
+    fn row(&self, n: usize) -> FinalRow {
+        let Self { engine, stresses, first_column, first_row, ref order } = *self;
+        let body = engine.body();
+        let i = order.as_ref().map_or_else(|| body.in_row(n), |order| order[n]);
+        let (strain, is_of_lattice) = (engine.strain(i), is_of_lattice(body, i));
+        let stress = |k: usize| stresses.map(|all| all[i].map(|stress| stress.components[k]));
+        FinalRow {
+            id: body.id(i),
+            column: is_of_lattice.then(|| i64::from(body.sites[i][0]) - first_column + 1),
+            row: is_of_lattice.then(|| i64::from(body.sites[i][1]) - first_row + 1),
+            role: engine.roles()[i].name(),
+            reference_x: body.reference.x[i],
+            reference_y: body.reference.y[i],
+            x: engine.present().x[i],
+            y: engine.present().y[i],
+            pe1: engine.pe1(i),
+            pe2: engine.pe2(i),
+            strain_xx: strain.map(|strain| strain.components[0]),
+            strain_yy: strain.map(|strain| strain.components[1]),
+            strain_xy: strain.map(|strain| strain.components[2]),
+            rotation: strain.map(|strain| strain.rotation),
+            stress_xx: stress(0),
+            stress_yy: stress(1),
+            stress_xy: stress(2),
+            von_mises: stresses.map(|all| all[i].map(|stress| stress.von_mises)),
+        }
+    }
+}
+
+/// Whether a particle stands at a site, which has a column and a row.
+fn is_of_lattice(body: &Body, i: usize) -> bool {
+    body.numbering.is_none() && body.sites[i][0] != Body::ALONG_OUTLINE
 }
 
 /// Writes every broken bond in the order they broke: its step (0 for those cut before the first), its
