@@ -70,7 +70,7 @@ pub fn return_what_is_dropped() {
     }
 }
 
-/// The system's allocator, which asks for large pages where an array fills several of them: the system sets up a page when it is
+/// The system's allocator, which asks for large pages where an array is as long as one of them: the system sets up a page when it is
 /// first touched, and many give large ones only to what asks. A run of 1.1 million particles touches 176,000 pages for the first time
 /// instead of 354,000 (`perf stat -e page-faults flockform run`, AMD EPYC, 26 November 2026).
 #[cfg(target_os = "linux")]

@@ -130,8 +130,8 @@ pub(super) fn write_final(
     Ok(Some(path))
 }
 
-/// Rows that a thread makes text of, or a rank sends, at once.
-const ROWS_OF_A_PIECE: usize = 1 << 12;
+/// Rows that a thread makes text of, or a rank sends, at once: few, for all threads have theirs in memory.
+const ROWS_OF_A_PIECE: usize = 1 << 10;
 
 fn pieces(rows: Range<usize>) -> Vec<Range<usize>> {
     let from = rows.clone().step_by(ROWS_OF_A_PIECE);
