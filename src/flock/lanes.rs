@@ -3,17 +3,19 @@
 //! Lanes are never added to each other, so the width changes no bit.
 
 /// A loop that is compiled for several widths.
-pub trait InLanes {
+pub trait InLanes: Sized {
+    /// Bytes of a number: four or eight.
+    const BYTES: usize;
+
+    /// Whether it waits for multiplications, or else for loads and stores. The first take two of the widest vectors at a time:
+    /// measured, up to twice as fast. The others take one of AVX2's: measured, no slower than AVX-512 on the processors
+    /// tried, and 1.4 times as fast as the oldest vectors in bodies within the caches.
+    const MULTIPLIES: bool;
+
     /// Runs it with `W` numbers at a time. Implementations are `#[inline(always)]`, or they are compiled for the oldest
     /// processor.
     fn run<const W: usize>(self);
 }
-
-/// For [`in_lanes`]: one of AVX2's vectors at a time, for loops that wait for loads and stores. Measured: no slower than
-/// AVX-512 on the processors tried, and 1.4 times as fast as the oldest vectors in bodies within the caches.
-pub(crate) const MEMORY: bool = false;
-/// For [`in_lanes`]: two of the widest vectors at a time, for loops that multiply. Measured: up to twice as fast.
-pub(crate) const ARITHMETIC: bool = true;
 
 /// The vectors that [`in_lanes`] takes on this processor, in words.
 pub fn vectors() -> &'static str {
@@ -26,39 +28,48 @@ pub fn vectors() -> &'static str {
     "of 16 bytes"
 }
 
-/// Runs a loop over numbers of so many bytes.
-pub fn in_lanes<const BYTES: usize, const LOAD: bool>(work: impl InLanes) {
+/// Runs a loop. Of the branches on its constants those alone are compiled that it takes.
+pub fn in_lanes<L: InLanes>(work: L) {
     #[cfg(target_arch = "x86_64")]
-    if LOAD == ARITHMETIC && is_x86_feature_detected!("avx512f") {
+    if L::MULTIPLIES && is_x86_feature_detected!("avx512f") {
         // SAFETY: the processor has AVX-512, which is all that the callee asks for.
-        return unsafe { avx512::<BYTES>(work) };
+        return unsafe { avx512(work) };
     } else if is_x86_feature_detected!("avx2") {
         // SAFETY: the processor has AVX2, which is all that the callee asks for.
-        return unsafe { avx2::<BYTES, LOAD>(work) };
+        return unsafe { avx2(work) };
     }
     // 16 bytes: the vectors of the oldest x86-64 and of every aarch64.
-    match (BYTES, LOAD) {
-        (4, MEMORY) => work.run::<4>(),
-        (4, ARITHMETIC) => work.run::<8>(),
-        (_, MEMORY) => work.run::<2>(),
-        (_, ARITHMETIC) => work.run::<4>(),
-    }
+    if L::MULTIPLIES { in_bytes::<L, 32>(work) } else { in_bytes::<L, 16>(work) }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f")]
-fn avx512<const BYTES: usize>(work: impl InLanes) {
-    if BYTES == 4 { work.run::<32>() } else { work.run::<16>() }
+fn avx512<L: InLanes>(work: L) {
+    in_bytes::<L, 128>(work);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn avx2<const BYTES: usize, const LOAD: bool>(work: impl InLanes) {
-    match (BYTES, LOAD) {
-        (4, MEMORY) => work.run::<8>(),
-        (4, ARITHMETIC) => work.run::<16>(),
-        (_, MEMORY) => work.run::<4>(),
-        (_, ARITHMETIC) => work.run::<8>(),
+fn avx2<L: InLanes>(work: L) {
+    if L::MULTIPLIES { in_bytes::<L, 64>(work) } else { in_bytes::<L, 32>(work) }
+}
+
+/// Runs a loop with as many numbers at a time as fill so many bytes.
+#[inline(always)]
+fn in_bytes<L: InLanes, const BYTES: usize>(work: L) {
+    match L::BYTES {
+        4 => match BYTES {
+            16 => work.run::<4>(),
+            32 => work.run::<8>(),
+            64 => work.run::<16>(),
+            _ => work.run::<32>(),
+        },
+        _ => match BYTES {
+            16 => work.run::<2>(),
+            32 => work.run::<4>(),
+            64 => work.run::<8>(),
+            _ => work.run::<16>(),
+        },
     }
 }
 

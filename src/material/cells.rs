@@ -58,22 +58,25 @@ impl Cells {
     /// All cells whose corners are particles of the body and not of its frame, in the order of their
     /// first corner's particle.
     pub fn of_body(body: &Body) -> Self {
-        // Particles are numbered in the lexicographic order of their sites.
-        let lookup = |site: Site| {
-            body.sites.binary_search(&site).ok().filter(|&i| !body.is_frame[i]).map(|i| i as u32)
-        };
-        Self::of_sites(&body.lattice, &body.sites, lookup)
+        Self::of_sites(&body.lattice, &body.sites, |i| !body.is_frame[i])
     }
 
-    /// All cells whose corners `lookup` knows, in the order of `sites`.
-    pub fn of_sites(lattice: &Lattice, sites: &[Site], lookup: impl Fn(Site) -> Option<u32>) -> Self {
+    /// All cells whose corners are at sites that take part, in the order of `sites`, which is lexicographic.
+    pub fn of_sites(lattice: &Lattice, sites: &[Site], takes_part: impl Fn(usize) -> bool) -> Self {
         let templates = templates(lattice);
         let mut cells = Self::of_lattice(lattice, 1);
+        // Corners ascend as the sites do that they belong to: each is looked for from where it was last.
+        let mut last: Vec<Vec<usize>> = templates.iter().map(|template| vec![0; template.len()]).collect();
         let mut found = Vec::new();
         for &[i, j] in sites.iter().filter(|&&site| lattice.sublattice(site) == 0) {
-            for (kind, template) in templates.iter().enumerate() {
+            for (kind, (template, last)) in templates.iter().zip(&mut last).enumerate() {
                 found.clear();
-                found.extend(template.iter().map_while(|corner| lookup([i + corner[0], j + corner[1]])));
+                found.extend(template.iter().zip(last).map_while(|(corner, last)| {
+                    let site = [i + corner[0], j + corner[1]];
+                    *last += sites[*last..].iter().take_while(|&&before| before < site).count();
+                    let is_there = sites.get(*last) == Some(&site) && takes_part(*last);
+                    is_there.then_some(*last as u32)
+                }));
                 if found.len() == template.len() {
                     cells.push(&found, kind as u32);
                 }

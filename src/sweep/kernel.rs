@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use super::rows::{Coefficients, Run};
 use super::terms::Terms;
-use crate::flock::lanes::{ARITHMETIC, InLanes, MEMORY, in_lanes};
+use crate::flock::lanes::{InLanes, in_lanes};
 use crate::flock::real::Real;
 use means::{Any, AsTheyAre, Equal, Matrix, Mean, Part, Scalar};
 
@@ -171,13 +171,7 @@ impl<T: Real, const P: usize> Work<'_, '_, T, P> {
     }
 
     fn dispatch<M: Mean>(self) {
-        let loops = Loops::<M, T, P>(self, PhantomData);
-        match (size_of::<T>(), M::LOAD) {
-            (4, MEMORY) => in_lanes::<4, MEMORY>(loops),
-            (4, ARITHMETIC) => in_lanes::<4, ARITHMETIC>(loops),
-            (_, MEMORY) => in_lanes::<8, MEMORY>(loops),
-            (_, ARITHMETIC) => in_lanes::<8, ARITHMETIC>(loops),
-        }
+        in_lanes(Loops::<M, T, P>(self, PhantomData));
     }
 }
 
@@ -187,6 +181,9 @@ pub(super) const WHOLE: usize = 1 << (usize::BITS - 2);
 struct Loops<'a, 'b, M, T, const P: usize>(Work<'a, 'b, T, P>, PhantomData<M>);
 
 impl<M: Mean, T: Real, const P: usize> InLanes for Loops<'_, '_, M, T, P> {
+    const BYTES: usize = size_of::<T>();
+    const MULTIPLIES: bool = M::MULTIPLIES;
+
     #[inline(always)]
     fn run<const W: usize>(self) {
         let Work { runs, tables, tile, components, after } = self.0;

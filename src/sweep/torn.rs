@@ -13,7 +13,7 @@ use std::ops::Range;
 
 use super::kernel::Component;
 use crate::flock::fracture::{Bonds, StandIn};
-use crate::flock::lanes::{ARITHMETIC, InLanes, in_lanes};
+use crate::flock::lanes::{InLanes, in_lanes};
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::vectors::Vectors;
 
@@ -125,7 +125,7 @@ impl DamagedRows {
 
     /// Computes both coordinates of the targets of those in some bands, whatever stands there.
     pub fn sweep(&self, bands: Range<usize>, reference: &Vectors, components: &mut [Component<'_, f64>; 2]) {
-        in_lanes::<8, ARITHMETIC>(Torns { bands: &self.bands[bands], reference, components });
+        in_lanes(Torns { bands: &self.bands[bands], reference, components });
     }
 }
 
@@ -212,6 +212,9 @@ struct Torns<'a, 'b> {
 }
 
 impl InLanes for Torns<'_, '_> {
+    const BYTES: usize = 8;
+    const MULTIPLIES: bool = true;
+
     #[inline(always)]
     fn run<const W: usize>(self) {
         sweep_bands(self.bands, self.reference, self.components);

@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use super::super::lanes::{ARITHMETIC, InLanes, in_lanes};
+use super::super::lanes::{InLanes, in_lanes};
 use super::super::neighbourhood::Neighbours;
 use super::super::vectors::{Vectors, distance};
 use super::Threshold;
@@ -120,7 +120,7 @@ impl Watch {
     }
 
     fn look(&self, present: &Vectors, suspects: &mut Vec<usize>) {
-        in_lanes::<8, ARITHMETIC>(Looks { blocks: &self.blocks, present, suspects });
+        in_lanes(Looks { blocks: &self.blocks, present, suspects });
     }
 }
 
@@ -132,6 +132,9 @@ struct Looks<'a> {
 }
 
 impl InLanes for Looks<'_> {
+    const BYTES: usize = 8;
+    const MULTIPLIES: bool = true;
+
     #[inline(always)]
     fn run<const W: usize>(self) {
         look_over(self.blocks, self.present, self.suspects);

@@ -9,7 +9,7 @@ use super::matrix::{Matrix, Run};
 use super::packs::PACK;
 use super::rows::RowRef;
 use crate::flock::block::{Block, inverse, transposed};
-use crate::flock::lanes::{InLanes, MEMORY, in_lanes};
+use crate::flock::lanes::{InLanes, in_lanes};
 use crate::solve::field::{Real, VectorsRef};
 
 /// Particles at a time: four AVX2 vectors of single and eight of double precision, so that a block is
@@ -168,7 +168,7 @@ pub fn pass<T: Real>(
     task: &mut impl Task<T>,
 ) {
     // Measured with AVX2: the beams of the benchmark are solved 1.2 to 2.5 times as fast.
-    in_lanes::<8, MEMORY>(Pass { matrix, stencils, group, u, task });
+    in_lanes(Pass { matrix, stencils, group, u, task });
 }
 
 /// A group to go over, in pieces of a width of their own.
@@ -181,6 +181,9 @@ struct Pass<'a, T, K> {
 }
 
 impl<T: Real, K: Task<T>> InLanes for Pass<'_, T, K> {
+    const BYTES: usize = size_of::<T>();
+    const MULTIPLIES: bool = false;
+
     #[inline(always)]
     fn run<const W: usize>(self) {
         let Self { matrix, stencils, group, u, task } = self;

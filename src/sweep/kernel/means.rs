@@ -1,14 +1,14 @@
 //! Means of neighbours over a part of a run, and the terms that complete them while they are in the registers.
 
 use super::{After, BOTH, CONTRACTED, Component, DAMPED, FED, Run, Tables};
-use crate::flock::lanes::{ARITHMETIC, MEMORY, lanes};
+use crate::flock::lanes::lanes;
 use crate::flock::real::Real;
 use crate::sweep::terms::Finish;
 
 /// How a mean is taken: a number of neighbours, and their coefficients.
 pub(super) trait Mean {
-    /// The resource that bounds its loops.
-    const LOAD: bool;
+    /// Whether its loops wait for multiplications, or else for loads and stores.
+    const MULTIPLIES: bool = false;
 
     /// Whether the loops complete the means themselves: with feedback and damping, or with the Poisson term.
     const COMPLETES: bool = false;
@@ -164,7 +164,6 @@ fn fill_lanes<T: Real, const N: usize, const W: usize, F: Finish<T>>(
 pub(super) struct Equal<const N: usize, const A: u8>;
 
 impl<const N: usize, const A: u8> Mean for Equal<N, A> {
-    const LOAD: bool = MEMORY;
     const COMPLETES: bool = true;
 
     #[inline(always)]
@@ -199,7 +198,6 @@ struct Weights<T, const N: usize> {
 }
 
 impl<const N: usize, const A: u8> Mean for Scalar<N, A> {
-    const LOAD: bool = MEMORY;
     const COMPLETES: bool = true;
 
     #[inline(always)]
@@ -232,8 +230,6 @@ impl<T: Real, const N: usize> Of<T, N> for Weights<T, N> {
 pub(super) struct Any;
 
 impl Mean for Any {
-    const LOAD: bool = MEMORY;
-
     #[inline(always)]
     fn fill<T: Real, const P: usize, const W: usize>(part: &mut Part<'_, '_, T, P>) {
         let (distances, all, rests) = (part.distances(), part.coefficients(), part.run.rests);
@@ -267,8 +263,6 @@ impl Mean for Any {
 pub(super) struct AsTheyAre;
 
 impl Mean for AsTheyAre {
-    const LOAD: bool = MEMORY;
-
     #[inline(always)]
     fn fill<T: Real, const P: usize, const W: usize>(_: &mut Part<'_, '_, T, P>) {}
 }
@@ -277,7 +271,7 @@ impl Mean for AsTheyAre {
 pub(super) struct Matrix;
 
 impl Mean for Matrix {
-    const LOAD: bool = ARITHMETIC;
+    const MULTIPLIES: bool = true;
 
     #[inline(always)]
     fn fill<T: Real, const P: usize, const W: usize>(part: &mut Part<'_, '_, T, P>) {
