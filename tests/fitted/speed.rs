@@ -54,7 +54,7 @@ fn least(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 #[test]
-#[ignore = "times, for an optimised build and a quiet machine; not reached yet: 1.2 to 1.6 on two threads, 1.4 to 1.8 on one"]
+#[ignore = "times, for an optimised build and a quiet machine; not reached yet: 1.3 to 1.7 on two threads, 1.5 to 1.9 on one"]
 fn fitted_bodies_are_solved_in_at_most_half_as_much_time_more_than_whole_cells() {
     let plate = |sides: [f64; 2]| format!("shape = {{ kind = \"rectangle\", max = {sides:?} }}");
     let sieve = |n: usize, radius: f64| format!("{}\nholes = [{}]", plate([40.0; 2]), holes(n, radius));
