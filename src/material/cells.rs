@@ -72,12 +72,11 @@ impl Cells {
             for (kind, (template, last)) in templates.iter().zip(&mut last).enumerate() {
                 found.clear();
                 found.extend(template.iter().zip(last).map_while(|(corner, last)| {
-                    // As pairs, which are compared where arrays would call a function.
-                    let site = (i + corner[0], j + corner[1]);
-                    while sites.get(*last).is_some_and(|&before| <(i32, i32)>::from(before) < site) {
+                    let site = [i + corner[0], j + corner[1]];
+                    while sites.get(*last).is_some_and(|&before| before < site) {
                         *last += 1;
                     }
-                    let is_there = sites.get(*last) == Some(&site.into()) && takes_part(*last);
+                    let is_there = sites.get(*last) == Some(&site) && takes_part(*last);
                     is_there.then_some(*last as u32)
                 }));
                 if found.len() == template.len() {
