@@ -57,6 +57,7 @@ fn avx2<L: InLanes>(work: L) {
 /// Runs a loop with as many numbers at a time as fill so many bytes.
 #[inline(always)]
 fn in_bytes<L: InLanes, const BYTES: usize>(work: L) {
+    // Not by their quotient: only branches on a constant itself are left out before they are compiled.
     match L::BYTES {
         4 => match BYTES {
             16 => work.run::<4>(),
