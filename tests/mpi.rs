@@ -442,8 +442,8 @@ const fn long(steps: &'static str) -> [&'static str; 12] {
 }
 
 const LONG: [&str; 12] = long("1500");
-/// One that does not end before an interrupt reaches it.
-const LONGER: [&str; 12] = long("15000");
+/// One whose ranks are not at its end yet when they are frozen for the second time.
+const LONGER: [&str; 12] = long("60000");
 
 /// A long run alone, in a folder of its own.
 fn alone(long: &[&str]) -> tempfile::TempDir {
@@ -490,6 +490,16 @@ fn assert_resumes(ranks: usize, folder: &Path, expected: &Path, what: &str) {
     let output = if ranks == 1 { flockform(&resume, folder) } else { on_ranks(ranks, &resume, folder) };
     assert_ends_well(&output, what);
     assert_same(&folder.join("o"), &expected.join("o"), what);
+}
+
+/// Whether a signal that asks a frozen process to end waits for it.
+fn is_asked_to_end(process: u32) -> bool {
+    const INT: u64 = 1 << 1;
+    const TERM: u64 = 1 << 14;
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).expect("it has not ended");
+    let waiting = status.lines().find_map(|line| line.strip_prefix("ShdPnd:")).expect("a set of signals");
+    let waiting = u64::from_str_radix(waiting.trim(), 16).expect("bits");
+    waiting & (INT | TERM) != 0
 }
 
 /// Process ids of the ranks.
@@ -590,9 +600,14 @@ fn a_rank_killed_at_any_moment_costs_no_more_than_the_last_checkpoint() {
 fn an_interrupt_of_the_launcher_ends_the_run_which_goes_on_to_the_same_bits() {
     let expected = alone(&LONGER);
     let folder = temporary();
-    let (mut run, _) = started(3, &LONGER, folder.path());
-    wait_for_checkpoint(folder.path());
+    let (mut run, ranks) = begun(3, &LONGER, 1, folder.path());
     signal("INT", run.0.id());
+    // Open MPI has the ranks go on, and passes the interrupt to them a second later.
+    within(PATIENCE, "an interrupt of the ranks", || {
+        signal("STOP", ranks[1]);
+        is_asked_to_end(ranks[1]).then_some(())
+    });
+    signal("CONT", ranks[1]);
     let interrupted = Instant::now();
     let (is_well, said) = ended(&mut run);
     assert!(!is_well, "{said}");
