@@ -4,7 +4,7 @@ mod increments;
 
 use std::ops::ControlFlow;
 
-use super::layout::{held, held_components};
+use super::layout::roles::{held, held_components};
 use super::parts::agreed;
 use super::plan::Plan;
 use super::run::{Outcome, SharedError, StopReason, overflow, run_shared, run_watched};

@@ -10,7 +10,9 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::among::followed;
-use super::layout::{FLAT, Layout, outlay_of, refuse_body, refuse_fit, to_be_fitted};
+use super::layout::refusals::{refuse_body, refuse_fit};
+use super::layout::regions::FLAT;
+use super::layout::{Layout, outlay_of, to_be_fitted};
 use crate::flock::body::{Body, Cut};
 use crate::flock::lattice::Lattice;
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};

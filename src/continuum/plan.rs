@@ -5,7 +5,10 @@ use std::sync::Arc;
 
 use super::among::{Among, followed, require_loaded};
 use super::damping::along_outline;
-use super::layout::{Layout, ReferenceMotion, held_components, no_particle, refuse_pieces};
+use super::layout::Layout;
+use super::layout::refusals::refuse_pieces;
+use super::layout::regions::no_particle;
+use super::layout::roles::{ReferenceMotion, held_components};
 use super::parts::{Parting, agreed};
 use super::pieces::require_connected;
 use super::{places, weights};

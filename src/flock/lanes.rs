@@ -2,6 +2,8 @@
 //!
 //! Lanes are never added to each other, so the width changes no bit.
 
+use super::real::Real;
+
 /// A loop that is compiled for several widths.
 pub trait InLanes: Sized {
     /// Bytes of a number: four or eight.
@@ -78,4 +80,17 @@ fn in_bytes<L: InLanes, const BYTES: usize>(work: L) {
 #[inline(always)]
 pub fn lanes<T: Copy, const W: usize>(slice: &[T], at: usize) -> [T; W] {
     slice[at..at + W].try_into().expect("as many as asked for")
+}
+
+/// Adds a matrix, by rows, times vectors to their sums: the step that a product with rows of matrices is made of, in sweeps as in solvers.
+#[inline(always)]
+pub fn add_product<T: Real, const W: usize>(
+    [xx, xy, yx, yy]: [T; 4],
+    [x, y]: &[[T; W]; 2],
+    sum: &mut [[T; W]; 2],
+) {
+    for k in 0..W {
+        sum[0][k] += xx * x[k] + xy * y[k];
+        sum[1][k] += yx * x[k] + yy * y[k];
+    }
 }

@@ -35,6 +35,7 @@ use crate::flock::lattice::{Lattice, Site};
 use crate::flock::outlay::{Census, cell_width};
 use crate::flock::part::Extent;
 use crate::flock::vectors::{Vectors, distance};
+use crate::flock::window::Window;
 use crate::geometry::outline::{Outline, Place};
 use crate::geometry::partition::Partition;
 
@@ -382,14 +383,8 @@ impl Band {
         Ok(census)
     }
 
-    /// The sites of some columns at which particles stand, ascending.
     fn regular(&self, columns: &Columns<'_>) -> Vec<Site> {
-        // Those near the outline that are in cells, and those far from it.
-        let near = self.faces.nodes.iter().zip(&self.used).filter(|(_, used)| **used);
-        let near = near.filter_map(|(node, _)| node.site).filter(|&site| columns.has(site));
-        let mut sites: Vec<Site> = columns.far_inside().chain(near).collect();
-        sites.sort_unstable();
-        sites
+        columns.sites(|node| self.used[node as usize] && self.faces.nodes[node as usize].site.is_some())
     }
 
     /// The whole body.
@@ -416,10 +411,9 @@ impl Band {
             along.sort_unstable();
         }
         let step = if self.lattice.is_site([0, 1]) { 1 } else { 2 };
-        let mut part = Laid { regular: &regular, ..Laid::default() };
-        part.along.resize(self.along.len(), u32::MAX);
+        let mut part = Laid::new(columns.window(), self.along.len());
         let mut next = along.iter().peekable();
-        let add_along = |part: &mut Laid<'_>, k: u32| {
+        let add_along = |part: &mut Laid, k: u32| {
             part.along[k as usize] = part.sites.len() as u32;
             part.sites.push([Body::ALONG_OUTLINE, k as i32 * step]);
             part.reference.push(self.faces.nodes[self.along[k as usize] as usize].point);
@@ -429,8 +423,7 @@ impl Band {
             while let Some((_, k)) = next.next_if(|(column, _)| is_part && *column < site[0]) {
                 add_along(&mut part, *k);
             }
-            part.here.push(part.sites.len() as u32);
-            part.sites.push(site);
+            part.add_at(site);
             part.reference.push(self.lattice.position(site));
             part.order.push(number);
         }
@@ -442,7 +435,7 @@ impl Band {
                 places[particle as usize] = node.place.filter(|place| self.outline.is_bounding(place.ring));
             }
         }
-        let (cells, cut) = self.cells(&columns, &part);
+        let (cells, cut) = self.cells(&columns, &regular, &part);
         let here = part.along.iter().enumerate().filter(|(_, here)| **here != u32::MAX);
         let mut along: Vec<[usize; 2]> = here.map(|(k, &here)| [here as usize, k]).collect();
         along.sort_unstable();
@@ -466,7 +459,7 @@ impl Band {
     }
 
     /// The particle that a node is, if it is one of those laid out.
-    fn particle(&self, part: &Laid<'_>, node: u32) -> Option<u32> {
+    fn particle(&self, part: &Laid, node: u32) -> Option<u32> {
         let (used, along) = (self.used[node as usize], self.number_along[node as usize]);
         match self.faces.nodes[node as usize].site.filter(|_| used) {
             Some(site) => part.index(site),
@@ -491,11 +484,11 @@ impl Band {
     }
 
     /// Whole cells by their first corner, then the others, and which of all these each is.
-    fn cells(&self, columns: &Columns<'_>, part: &Laid<'_>) -> (Cells, Vec<usize>) {
+    fn cells(&self, columns: &Columns<'_>, regular: &[Site], part: &Laid) -> (Cells, Vec<usize>) {
         let mut cells = Cells::of_lattice(&self.lattice, self.outline.regions().len() + 1);
         let is_inside = |site: Site| columns.is_inside(site);
         let mut corners = Vec::new();
-        for &[i, j] in part.regular.iter().filter(|&&site| self.lattice.sublattice(site) == 0) {
+        for &[i, j] in regular.iter().filter(|&&site| self.lattice.sublattice(site) == 0) {
             for (kind, template) in self.scale.templates.iter().enumerate() {
                 let region = match self.faces.whole([i, j], kind) {
                     None if self.is_far_cell([i, j], kind, is_inside) => {
@@ -548,11 +541,10 @@ pub struct Numbers {
 }
 
 /// The particles that are laid out.
-#[derive(Default)]
-struct Laid<'a> {
-    /// Sites at which some of them stand, ascending, and these by their indices.
-    regular: &'a [Site],
-    here: Vec<u32>,
+struct Laid {
+    window: Window,
+    /// The index of the particle at each site of the window; [`u32::MAX`] where there is none.
+    at: Vec<u32>,
     /// The index of each particle at no site; [`u32::MAX`] of those that are not here.
     along: Vec<u32>,
     sites: Vec<Site>,
@@ -561,9 +553,21 @@ struct Laid<'a> {
     order: Vec<u32>,
 }
 
-impl Laid<'_> {
+impl Laid {
+    fn new(window: Window, along: usize) -> Self {
+        let (at, along) = (vec![u32::MAX; window.count() as usize], vec![u32::MAX; along]);
+        Self { window, at, along, sites: Vec::new(), reference: Vectors::default(), order: Vec::new() }
+    }
+
+    fn add_at(&mut self, site: Site) {
+        if let Some(cell) = self.window.number(site) {
+            self.at[cell] = self.sites.len() as u32;
+        }
+        self.sites.push(site);
+    }
+
     fn index(&self, site: Site) -> Option<u32> {
-        self.regular.binary_search(&site).ok().map(|i| self.here[i])
+        self.window.number(site).map(|cell| self.at[cell]).filter(|&here| here != u32::MAX)
     }
 }
 

@@ -333,8 +333,8 @@ impl Columns<'_> {
         (0..self.window.columns).contains(&(i64::from(column) - i64::from(self.window.low[0])))
     }
 
-    pub fn has(&self, site: Site) -> bool {
-        self.window.number(site).is_some()
+    pub fn window(&self) -> Window {
+        self.window
     }
 
     /// See [`Sites::is_inside`].
@@ -357,11 +357,16 @@ impl Columns<'_> {
         })
     }
 
-    /// Sites inside that are far from the outline, ascending.
-    pub fn far_inside(&self) -> impl Iterator<Item = Site> + '_ {
-        (0..self.marks.len())
-            .filter(|&cell| self.marks[cell] == FAR_INSIDE)
-            .map(|cell| self.window.site(cell))
+    /// The sites far inside, and those near the outline whose number in [`Sites::near`] is taken; ascending.
+    pub fn sites(&self, is_taken: impl Fn(u32) -> bool) -> Vec<Site> {
+        let Window { low, rows, .. } = self.window;
+        let is_taken = |mark: u32| mark == FAR_INSIDE || (mark != FAR_OUTSIDE && is_taken(mark));
+        let mut sites = Vec::new();
+        for (column, marks) in (low[0]..).zip(self.marks.chunks_exact(rows as usize)) {
+            let rows = (low[1]..).zip(marks).filter(|(_, mark)| is_taken(**mark));
+            sites.extend(rows.map(|(row, _)| [column, row]));
+        }
+        sites
     }
 }
 

@@ -9,7 +9,7 @@ use super::matrix::{Matrix, Run};
 use super::packs::PACK;
 use super::rows::RowRef;
 use crate::flock::block::{Block, inverse, transposed};
-use crate::flock::lanes::{InLanes, in_lanes};
+use crate::flock::lanes::{InLanes, add_product, in_lanes, lanes};
 use crate::solve::field::{Real, VectorsRef};
 
 /// Particles at a time: four AVX2 vectors of single and eight of double precision, so that a block is
@@ -120,12 +120,12 @@ struct InARow<'a, T> {
 impl<T: Real, const W: usize> Particles<T, W> for InARow<'_, T> {
     #[inline(always)]
     fn of(&self, values: &[T]) -> [T; W] {
-        *array(values, self.at)
+        lanes(values, self.at)
     }
 
     #[inline(always)]
     fn set(&self, values: &mut [T], begin: usize, new: [T; W]) {
-        *array_mut(values, self.at - begin) = new;
+        values[self.at - begin..][..W].copy_from_slice(&new);
     }
 
     #[inline(always)]
@@ -205,15 +205,15 @@ fn over_runs<T: Real>(
         let inverse = stencils.inverse(run.class);
         let (mut at, end) = (run.start as usize, (run.start + run.len) as usize);
         while at + WIDE <= end {
-            lanes::<T, WIDE>(blocks, distances, inverse, at, u, task);
+            several::<T, WIDE>(blocks, distances, inverse, at, u, task);
             at += WIDE;
         }
         while at + NARROW <= end {
-            lanes::<T, NARROW>(blocks, distances, inverse, at, u, task);
+            several::<T, NARROW>(blocks, distances, inverse, at, u, task);
             at += NARROW;
         }
         if at + NARROWEST <= end {
-            lanes::<T, NARROWEST>(blocks, distances, inverse, at, u, task);
+            several::<T, NARROWEST>(blocks, distances, inverse, at, u, task);
             at += NARROWEST;
         }
         while at < end {
@@ -252,7 +252,7 @@ fn over_packs<T: Real>(
 }
 
 #[inline(always)]
-fn lanes<T: Real, const W: usize>(
+fn several<T: Real, const W: usize>(
     blocks: &[[T; 4]],
     distances: &[i32],
     inverse: &[T; 4],
@@ -260,16 +260,12 @@ fn lanes<T: Real, const W: usize>(
     u: VectorsRef<'_, T>,
     task: &mut impl Task<T>,
 ) {
-    let (mut x, mut y) = ([T::default(); W], [T::default(); W]);
-    for ([xx, yx, xy, yy], &distance) in blocks.iter().zip(distances) {
+    let mut sum = [[T::default(); W]; 2];
+    for (&[xx, yx, xy, yy], &distance) in blocks.iter().zip(distances) {
         let from = at.wrapping_add_signed(distance as isize);
-        let (ux, uy) = (array::<T, W>(u.x, from), array::<T, W>(u.y, from));
-        for k in 0..W {
-            x[k] += *xx * ux[k] + *xy * uy[k];
-            y[k] += *yx * ux[k] + *yy * uy[k];
-        }
+        add_product([xx, xy, yx, yy], &[lanes(u.x, from), lanes(u.y, from)], &mut sum);
     }
-    task.take(&InARow { at, inverse }, &x, &y);
+    task.take(&InARow { at, inverse }, &sum[0], &sum[1]);
 }
 
 /// One particle, as those along an outline are.
@@ -311,18 +307,6 @@ pub fn product(row: RowRef<'_>, distances: &[i32], at: usize, u: VectorsRef<'_, 
         add(-1.0, block, distance);
     }
     [sums[0] + sums[1], sums[2] + sums[3]]
-}
-
-/// The `W` values from number `at` on.
-#[inline(always)]
-pub fn array<T, const W: usize>(values: &[T], at: usize) -> &[T; W] {
-    values[at..at + W].try_into().expect("as many as asked for")
-}
-
-/// The `W` places from number `at` on.
-#[inline(always)]
-pub fn array_mut<T, const W: usize>(values: &mut [T], at: usize) -> &mut [T; W] {
-    (&mut values[at..at + W]).try_into().expect("as many as asked for")
 }
 
 #[cfg(test)]

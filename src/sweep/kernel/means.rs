@@ -1,7 +1,7 @@
 //! Means of neighbours over a part of a run, and the terms that complete them while they are in the registers.
 
 use super::{After, BOTH, CONTRACTED, Component, DAMPED, FED, Run, Tables};
-use crate::flock::lanes::lanes;
+use crate::flock::lanes::{add_product, lanes};
 use crate::flock::real::Real;
 use crate::sweep::terms::Finish;
 
@@ -308,7 +308,7 @@ impl MatrixRow<'_> {
         for (&distance, block) in self.distances.iter().zip(self.blocks) {
             let at = |seen_from: usize| (j - seen_from).wrapping_add_signed(distance);
             let seen: [[T; W]; 2] = [lanes(x.present, at(x.seen_from)), lanes(y.present, at(y.seen_from))];
-            add(block, &seen, &mut sum);
+            add_product(block.map(T::of), &seen, &mut sum);
         }
         // Zero is added as well: the rule does, and it makes 0.0 of -0.0.
         for (sum, rest) in sum.iter_mut().zip([x.rest, y.rest]) {
@@ -318,21 +318,10 @@ impl MatrixRow<'_> {
             }
         }
         if let (Some(of_x), Some(of_y)) = (x.force, y.force) {
-            add(&self.blocks[self.distances.len()], &[lanes(of_x, j), lanes(of_y, j)], &mut sum);
+            let compliance = self.blocks[self.distances.len()].map(T::of);
+            add_product(compliance, &[lanes(of_x, j), lanes(of_y, j)], &mut sum);
         }
         x.next[j - x.begin..][..W].copy_from_slice(&sum[0]);
         y.next[j - y.begin..][..W].copy_from_slice(&sum[1]);
-    }
-}
-
-/// Adds a matrix times vectors.
-#[inline(always)]
-fn add<T: Real, const W: usize>(block: &[f64; 4], [x, y]: &[[T; W]; 2], sum: &mut [[T; W]; 2]) {
-    let [xx, xy, yx, yy] = [T::of(block[0]), T::of(block[1]), T::of(block[2]), T::of(block[3])];
-    for k in 0..W {
-        sum[0][k] += xx * x[k] + xy * y[k];
-    }
-    for k in 0..W {
-        sum[1][k] += yx * x[k] + yy * y[k];
     }
 }
