@@ -13,15 +13,22 @@
 //!
 //! It is written beside its place, brought to the disk and then renamed, so that there is always a whole one.
 
+mod difference;
+mod error;
+#[cfg(test)]
+mod tests;
+
 use std::borrow::Cow;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, ErrorKind, Seek, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use self::difference::first_difference;
+pub use self::error::CheckpointError;
 use super::error::ExportError;
 use super::manifest::create;
 use super::parts::write_each;
@@ -106,84 +113,6 @@ impl RunRequest {
         let set = self.set.iter().flat_map(|set| ["--set".to_owned(), set.clone()]);
         ["run".to_owned(), self.scene.clone()].into_iter().chain(set)
     }
-}
-
-/// Error resuming a run from a checkpoint.
-#[derive(Debug, thiserror::Error)]
-pub enum CheckpointError {
-    /// Neither of the two folders has a checkpoint.
-    #[error(
-        "there is nothing to resume: neither {} nor {} holds a checkpoint\n  help: start the run again; one that ends by itself leaves none, and the first is written after --checkpoint-every",
-        .unfinished.display(), .out.display()
-    )]
-    Nothing {
-        /// The folder of an unfinished run.
-        unfinished: PathBuf,
-        /// The folder of outputs.
-        out: PathBuf,
-    },
-    /// The system refuses to read the checkpoint.
-    #[error("{} cannot be read: {source}", .path.display())]
-    Unreadable {
-        /// Path of the checkpoint.
-        path: PathBuf,
-        /// The error of the system.
-        source: std::io::Error,
-    },
-    /// The file does not begin as a checkpoint does.
-    #[error("{} is no checkpoint of flockform\n  help: give the folder of a run; remove the file to start again", .path.display())]
-    NotOne {
-        /// Path of the checkpoint.
-        path: PathBuf,
-    },
-    /// The file ends before its payload does.
-    #[error(
-        "{} is truncated: it has {found} bytes of {needed}\n  help: restore it from a copy, or remove it and start the run again",
-        .path.display()
-    )]
-    Truncated {
-        /// Path of the checkpoint.
-        path: PathBuf,
-        /// Its size \[byte\].
-        found: u64,
-        /// The size that its header asks for \[byte\].
-        needed: u64,
-    },
-    /// The payload is not what was written.
-    #[error(
-        "{} is corrupted: {what}\n  help: restore it from a copy, or remove it and start the run again",
-        .path.display()
-    )]
-    Corrupted {
-        /// Path of the checkpoint.
-        path: PathBuf,
-        /// The fault in it.
-        what: String,
-    },
-    /// Another version of the layout or of the program wrote the file.
-    #[error(
-        "{} is of {found}, this is {known}: the same bits cannot be promised\n  help: resume with the program that wrote it, or remove it and start the run again",
-        .path.display()
-    )]
-    Version {
-        /// Path of the checkpoint.
-        path: PathBuf,
-        /// The version that wrote it.
-        found: String,
-        /// The version that reads it.
-        known: String,
-    },
-    /// The checkpoint is of another scene, or files that the scene names have changed.
-    #[error(
-        "{} belongs to another scene: {what}\n  help: resume with the scene that was run, or start this one with another --out",
-        .path.display()
-    )]
-    Foreign {
-        /// The file or its folder.
-        path: PathBuf,
-        /// The difference.
-        what: String,
-    },
 }
 
 impl<'a> Checkpoint<'a> {
@@ -462,147 +391,4 @@ fn sync_folder(folder: &Path) -> std::io::Result<()> {
 
 fn as_json(scene: &Scene) -> String {
     serde_json::to_string(&scene.raw).expect("a scene was read from text")
-}
-
-/// The first key with another value, and both values.
-fn first_difference(then: &Value, now: &Value, key: String) -> Option<String> {
-    if then == now {
-        return None;
-    }
-    let at = |name: &str| if key.is_empty() { name.to_owned() } else { format!("{key}.{name}") };
-    match (then, now) {
-        (Value::Object(a), Value::Object(b)) => {
-            let names = a.keys().chain(b.keys().filter(|name| !a.contains_key(*name)));
-            names.into_iter().find_map(|name| {
-                let of = |map: &serde_json::Map<_, _>| map.get(name).cloned().unwrap_or_default();
-                first_difference(&of(a), &of(b), at(name))
-            })
-        }
-        (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
-            let pairs = a.iter().zip(b).enumerate();
-            pairs.into_iter().find_map(|(n, (a, b))| first_difference(a, b, format!("{key}[{n}]")))
-        }
-        _ => Some(format!("`{key}` was {}, is {}", shortly(then), shortly(now))),
-    }
-}
-
-fn shortly(value: &Value) -> String {
-    let text = value.to_string();
-    match text.char_indices().nth(60) {
-        Some((end, _)) => format!("{}...", &text[..end]),
-        None => text,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::continuum::digest::digest;
-    use crate::continuum::plan::Plan;
-    use crate::engine::Engine;
-    use crate::scene::bundled;
-
-    fn scene(sets: &[&str]) -> Scene {
-        let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
-        bundled("tension").expect("bundled").load(&sets).expect("valid")
-    }
-
-    fn written(folder: &Path) -> (EngineState<'static>, Vec<u8>) {
-        let scene = scene(&[]);
-        let plan = Plan::new(&scene).expect("fits");
-        let sum = digest(&plan);
-        let mut engine = Engine::new(plan.setup);
-        let mut probe = ProbeSeries::new(66);
-        for _ in 0..25 {
-            engine.advance();
-            probe.record(&engine);
-        }
-        let asked = RunRequest { scene: "tension".into(), set: vec!["a.b=1".into()], force: false };
-        let state = EngineState::of(&engine);
-        let (snapshots, probes) = ([Snapshot::of(&engine)], [probe]);
-        let checkpoint = Checkpoint::new(
-            (&asked, &scene, sum),
-            (state.clone(), f64::INFINITY),
-            (&snapshots, &probes, &[], None),
-            Duration::from_millis(1500),
-        );
-        checkpoint.write(folder).expect("written");
-        (state.into_owned(), fs::read(folder.join(FILE)).expect("there"))
-    }
-
-    #[test]
-    fn a_checkpoint_is_read_back_to_the_bit() {
-        let folder = tempfile::tempdir().expect("a folder");
-        assert!(Checkpoint::read(folder.path()).expect("readable").is_none());
-        let (state, _) = written(folder.path());
-        let read = Checkpoint::read(folder.path()).expect("readable").expect("there");
-        assert_eq!(read.engine, state);
-        assert_eq!(read.residual, f64::INFINITY);
-        assert_eq!(read.stepping, Duration::from_millis(1500));
-        let mut other = read.clone();
-        assert_eq!(other.fingerprint(), read.fingerprint());
-        other.residual = 1.0;
-        assert_ne!(other.fingerprint(), read.fingerprint());
-        assert_eq!((read.snapshots.len(), read.probes[0].pe1.len()), (1, 25));
-        assert_eq!(read.snapshots[0].step, 25);
-        let left: Vec<_> = fs::read_dir(folder.path()).expect("readable").flatten().collect();
-        assert_eq!(left.len(), 1, "{left:?}");
-    }
-
-    #[test]
-    fn every_truncation_and_every_flipped_bit_is_refused() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let (_, bytes) = written(folder.path());
-        let path = folder.path().join(FILE);
-        for length in (0..bytes.len()).step_by(97).chain(0..40) {
-            let error = Checkpoint::of_bytes(&path, &bytes[..length]).expect_err("truncated");
-            assert!(matches!(error, CheckpointError::Truncated { .. }), "{length}: {error}");
-        }
-        for at in (0..bytes.len()).step_by(61).chain(0..40) {
-            let mut bytes = bytes.clone();
-            bytes[at] ^= 0x10;
-            let error = Checkpoint::of_bytes(&path, &bytes).expect_err("corrupted").to_string();
-            let expected = match at {
-                0..8 => "is no checkpoint of flockform",
-                8..12 => "layout",
-                12..20 => "",
-                _ => "is corrupted: its checksum differs",
-            };
-            assert!(error.contains(expected) && error.contains("help:"), "byte {at}: {error}");
-        }
-        let longer = [&bytes[..], &[0]].concat();
-        let error = Checkpoint::of_bytes(&path, &longer).expect_err("too long").to_string();
-        assert!(error.contains("bytes follow its end"), "{error}");
-    }
-
-    #[test]
-    fn another_program_s_checkpoint_is_refused_by_its_version() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let (_, mut bytes) = written(folder.path());
-        // The payload begins with the length of the version and the version.
-        assert_eq!(&bytes[HEADER + 1..HEADER + 1 + PROGRAM_VERSION.len()], PROGRAM_VERSION.as_bytes());
-        bytes[HEADER + 1] = b'9';
-        let sum = crc32fast::hash(&bytes[HEADER..]);
-        bytes[20..24].copy_from_slice(&sum.to_le_bytes());
-        let error = Checkpoint::of_bytes(&folder.path().join(FILE), &bytes).expect_err("other").to_string();
-        assert!(error.contains("flockform 9.") && error.contains(PROGRAM_VERSION), "{error}");
-    }
-
-    #[test]
-    fn a_foreign_scene_is_refused_by_its_key() {
-        let folder = tempfile::tempdir().expect("a folder");
-        written(folder.path());
-        let read = Checkpoint::read(folder.path()).expect("readable").expect("there");
-        let held = |sets: &[&str]| {
-            let scene = scene(sets);
-            read.require_of(folder.path(), &scene, digest(&Plan::new(&scene).expect("fits")))
-        };
-        held(&[]).expect("the same");
-        let error = held(&["lattice.spacing=2.0"]).expect_err("another").to_string();
-        assert!(error.contains("`lattice.spacing` was 1.0, is 2.0"), "{error}");
-        let error = held(&["roles[1].motion.per_step=[0.5, 0.0]"]).expect_err("another").to_string();
-        assert!(error.contains("`roles[1].motion.per_step[0]` was 0.6, is 0.5"), "{error}");
-        let error = read.require_of(folder.path(), &scene(&[]), 0).expect_err("changed file").to_string();
-        assert!(error.contains("a file that the scene names"), "{error}");
-    }
 }

@@ -83,8 +83,15 @@ impl Running {
         let own = self.0.id();
         let all = std::fs::read_dir("/proc").ok()?.flatten();
         let number = |entry: std::fs::DirEntry| entry.file_name().to_str()?.parse::<u32>().ok();
-        all.filter_map(number).find(|&process| parent(process) == Some(own))
+        all.filter_map(number).find(|&process| parent(process) == Some(own) && has_begun(process))
     }
+}
+
+/// Whether a worker has its own environment: until then the process that starts it waits for it, and one that is stopped then keeps
+/// both from going on.
+fn has_begun(process: u32) -> bool {
+    let environment = std::fs::read(format!("/proc/{process}/environ")).unwrap_or_default();
+    environment.split(|&byte| byte == 0).any(|variable| variable.starts_with(b"FLOCKFORM_LIFE="))
 }
 
 fn parent(process: u32) -> Option<u32> {

@@ -15,6 +15,7 @@
 //! bound are kept as they are, and a shape narrower than the spacing is refused.
 
 mod cut;
+mod faces;
 mod narrow;
 mod near;
 mod sites;
@@ -25,7 +26,7 @@ mod tidy;
 use std::ops::Range;
 use std::sync::Arc;
 
-use self::cut::Faces;
+use self::faces::{Face, Faces};
 use self::near::NearPieces;
 use self::sites::{Columns, Sites};
 use super::cells::{Cells, templates};
@@ -348,7 +349,7 @@ impl Band {
             let site = self.faces.nodes[node as usize].site;
             site.map_or_else(|| self.column_of(node), |site| site[0])
         };
-        let width = |face: &cut::Face| {
+        let width = |face: &Face| {
             let columns = face.corners.iter().map(column);
             columns.clone().max().unwrap_or(0) - columns.min().unwrap_or(0)
         };

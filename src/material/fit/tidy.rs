@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::cut::{Face, Faces, ways};
+use super::faces::{Face, Faces, ways};
 use super::{LEAST_AREA, LEAST_SIDE, LEAST_WIDTH, ROUNDING, Scale};
 use crate::flock::vectors::distance;
 
