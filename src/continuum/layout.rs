@@ -1,6 +1,6 @@
 //! From a scene to its body: particles, their neighbours, the cells between them, and their roles.
 
-pub mod loads;
+mod loads;
 pub(super) mod refusals;
 pub(super) mod regions;
 pub mod roles;
