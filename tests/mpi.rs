@@ -5,6 +5,7 @@
 
 #![cfg(all(feature = "cli", feature = "mpi"))]
 
+use std::collections::HashMap;
 use std::hash::{BuildHasher, RandomState};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -492,13 +493,18 @@ fn assert_resumes(ranks: usize, folder: &Path, expected: &Path, what: &str) {
     assert_same(&folder.join("o"), &expected.join("o"), what);
 }
 
+/// What the system says of a process that has not ended, by its own words for it.
+fn status_of(process: u32) -> Option<HashMap<String, String>> {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+    let lines = status.lines().filter_map(|line| line.split_once(':'));
+    Some(lines.map(|(name, value)| (name.to_owned(), value.trim().to_owned())).collect())
+}
+
 /// Whether a signal that asks a frozen process to end waits for it.
-fn is_asked_to_end(process: u32) -> bool {
+fn is_asked_to_end(status: &HashMap<String, String>) -> bool {
     const INT: u64 = 1 << 1;
     const TERM: u64 = 1 << 14;
-    let status = std::fs::read_to_string(format!("/proc/{process}/status")).expect("it has not ended");
-    let waiting = status.lines().find_map(|line| line.strip_prefix("ShdPnd:")).expect("a set of signals");
-    let waiting = u64::from_str_radix(waiting.trim(), 16).expect("bits");
+    let waiting = u64::from_str_radix(&status["ShdPnd"], 16).expect("bits");
     waiting & (INT | TERM) != 0
 }
 
@@ -604,13 +610,17 @@ fn an_interrupt_of_the_launcher_ends_the_run_which_goes_on_to_the_same_bits() {
     signal("INT", run.0.id());
     // Open MPI has the ranks go on, and passes the interrupt to them a second later.
     within(PATIENCE, "an interrupt of the ranks", || {
-        signal("STOP", ranks[1]);
-        is_asked_to_end(ranks[1]).then_some(())
+        // Half a second later the others have ended, and this one with them.
+        let Some(status) = status_of(ranks[1]) else { return Some(()) };
+        if !status["State"].starts_with('T') {
+            signals::is_sent("STOP", ranks[1]);
+        }
+        is_asked_to_end(&status).then_some(())
     });
-    signal("CONT", ranks[1]);
+    signals::is_sent("CONT", ranks[1]);
     let interrupted = Instant::now();
-    let (is_well, said) = ended(&mut run);
-    assert!(!is_well, "{said}");
+    // Whether it says that it ended well is its own affair: MPICH's does at times. There is a checkpoint only if the run did not.
+    let _ = ended(&mut run);
     assert!(interrupted.elapsed() < PATIENCE / 4, "{:?}", interrupted.elapsed());
     assert_resumes(2, folder.path(), expected.path(), "interrupted");
 }
