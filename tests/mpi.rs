@@ -619,8 +619,9 @@ fn an_interrupt_of_the_launcher_ends_the_run_which_goes_on_to_the_same_bits() {
     });
     signals::is_sent("CONT", ranks[1]);
     let interrupted = Instant::now();
-    // Whether it says that it ended well is its own affair: MPICH's does at times. There is a checkpoint only if the run did not.
-    let _ = ended(&mut run);
+    let (is_well, said) = ended(&mut run);
+    // MPICH's launcher, which begins its lines so, says at times that it ended well. There is a checkpoint only if the run did not.
+    assert!(!is_well || said.contains("[mpiexec@"), "{said}");
     assert!(interrupted.elapsed() < PATIENCE / 4, "{:?}", interrupted.elapsed());
     assert_resumes(2, folder.path(), expected.path(), "interrupted");
 }
