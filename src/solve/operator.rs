@@ -21,6 +21,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
+use columns::Finder;
 pub(crate) use columns::{Columns, Segment};
 pub(crate) use kernel::{Particles, RowCoefficients, Task, pass, product};
 #[cfg(test)]
@@ -343,7 +344,7 @@ impl Operator {
         &self,
         mut take: impl FnMut(Stretch, &[Option<usize>]) -> Option<R>,
     ) -> Option<R> {
-        let mut firsts = Vec::new();
+        let (mut firsts, mut finder) = (Vec::new(), Finder::default());
         for (column, segment) in self.columns.iter() {
             let (mut start, end) = (segment.start as usize, (segment.start + segment.len) as usize);
             while start < end {
@@ -357,8 +358,9 @@ impl Operator {
                 let same = (start..end).take_while(|&i| self.follows[i] && self.class[i] == class);
                 let mut len = same.count();
                 firsts.clear();
+                finder.go(&self.columns, site);
                 for (offset, _) in self.rows.of(class).entries {
-                    let found = self.columns.find(add(site, *offset));
+                    let found = finder.find(&self.columns, *offset);
                     len = len.min(found.map_or(1, |(_, room)| room));
                     firsts.push(found.map(|(first, _)| first));
                 }

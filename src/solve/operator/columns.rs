@@ -40,8 +40,9 @@ pub struct Columns {
     begins: Vec<u32>,
     /// Segments of the particles along an outline, each within a column, ascending by index.
     along: Vec<Segment>,
-    /// The same, ascending by row.
-    along_by_row: Vec<Segment>,
+    /// By row along an outline: the particle, and how many follow it in its segment, itself included; none of them where there is no
+    /// particle.
+    along_at: Vec<(u32, u32)>,
 }
 
 /// Column of the particles along an outline.
@@ -119,8 +120,12 @@ impl Columns {
     /// Ends the last column of so many particles in all.
     pub fn end(&mut self, count: usize) {
         self.open_next(count);
-        self.along_by_row.clone_from(&self.along);
-        self.along_by_row.sort_unstable_by_key(|segment| segment.row);
+        let rows = self.along.iter().map(|along| along.row + self.step * along.len as i32).max();
+        self.along_at = vec![(0, 0); rows.unwrap_or(0) as usize];
+        for &Segment { row, start, len } in &self.along {
+            let rows = self.along_at[row as usize..].iter_mut().step_by(self.step as usize);
+            rows.zip(0..len).for_each(|(at, k)| *at = (start + k, len - k));
+        }
     }
 
     /// The number of the column that a particle is in.
@@ -219,7 +224,11 @@ impl Columns {
 
     /// The particle at a site, and how many follow it in its segment, itself included.
     pub fn find(&self, [column, row]: Site) -> Option<(usize, usize)> {
-        let segments = if column == OUTLIERS { &self.along_by_row[..] } else { self.of(column) };
+        if column == OUTLIERS {
+            let (index, room) = *self.along_at.get(row as usize)?;
+            return (room > 0).then_some((index as usize, room as usize));
+        }
+        let segments = self.of(column);
         let after = segments.partition_point(|segment| segment.row <= row);
         let segment = segments[..after].last()?;
         let away = row - segment.row;
@@ -232,6 +241,44 @@ impl Columns {
     /// The columns, each with the index of its first particle, and the end of the last one.
     pub fn begins(&self) -> impl Iterator<Item = (i32, usize)> + '_ {
         (self.first..).zip(self.begins.iter().map(|&begin| begin as usize))
+    }
+}
+
+/// Finds what the rows of particles lead to, one particle after the other: those one above the other mostly lead to the same
+/// offsets.
+#[derive(Default)]
+pub struct Finder {
+    site: Site,
+    /// Sites from this particle to the one before.
+    steps: Option<usize>,
+    /// What this one was found to lead to, and the one before: offset, particle and how many follow it.
+    found: Vec<(Site, usize, usize)>,
+    before: Vec<(Site, usize, usize)>,
+}
+
+impl Finder {
+    /// Goes on to the particle at a site.
+    pub fn go(&mut self, columns: &Columns, site: Site) {
+        let away = site[1] - self.site[1];
+        self.steps = (site[0] == self.site[0] && away > 0 && away % columns.step == 0)
+            .then(|| (away / columns.step) as usize);
+        self.site = site;
+        std::mem::swap(&mut self.found, &mut self.before);
+        self.found.clear();
+    }
+
+    /// The particle at an offset from it, and how many follow that in its segment, itself included.
+    #[inline]
+    pub fn find(&mut self, columns: &Columns, offset: Site) -> Option<(usize, usize)> {
+        let like_before = self.steps.and_then(|steps| {
+            let &(known, first, room) = self.before.get(self.found.len())?;
+            (known == offset && room > steps).then(|| (first + steps, room - steps))
+        });
+        let found =
+            like_before.or_else(|| columns.find([self.site[0] + offset[0], self.site[1] + offset[1]]));
+        let (first, room) = found.unwrap_or_default();
+        self.found.push((offset, first, room));
+        found
     }
 }
 

@@ -5,7 +5,7 @@
 //! less than the memory takes, if the vectors are as wide as the processor has them. The loops are
 //! therefore compiled twice. Lanes are never added to each other, so the width changes no bit.
 
-use super::matrix::{Matrix, Run};
+use super::matrix::{LONG, Matrix, Run};
 use super::packs::PACK;
 use super::rows::RowRef;
 use crate::flock::block::{Block, inverse, transposed};
@@ -17,8 +17,8 @@ use crate::solve::field::{Real, VectorsRef};
 const WIDE: usize = 32;
 /// The same for what is left.
 const NARROW: usize = 8;
-/// The same for what is left then: columns that an outline cuts end anywhere.
-const NARROWEST: usize = 4;
+/// The same of short runs: columns that an outline cuts end anywhere.
+const NARROWEST: usize = LONG as usize;
 
 /// The rows of a matrix in the precision they are applied in.
 #[derive(Clone, Debug)]
@@ -60,8 +60,8 @@ impl<T: Real> RowCoefficients<T> {
             stencils.starts.push(stencils.blocks.len() as u32);
             stencils.inverse.push(cast(inverse(row.diagonal).unwrap_or_default(), 1.0 / scale));
         }
-        stencils.packed = matrix.packs.interleaved(|class| blocks(matrix.rows.of(class), scale));
-        stencils.packed_inverse = matrix.packs.of_each(|class| stencils.inverse[class as usize]);
+        stencils.packed = matrix.packs().interleaved(|class| blocks(matrix.rows.of(class), scale));
+        stencils.packed_inverse = matrix.packs().of_each(|class| stencils.inverse[class as usize]);
         stencils
     }
 
@@ -159,6 +159,29 @@ impl<T: Real> Particles<T, PACK> for Packed<'_, T> {
     }
 }
 
+/// The particles of a pack from number `at` on.
+struct PackedInARow<'a, T> {
+    at: usize,
+    inverse: &'a [[T; PACK]; 4],
+}
+
+impl<T: Real> Particles<T, PACK> for PackedInARow<'_, T> {
+    #[inline(always)]
+    fn of(&self, values: &[T]) -> [T; PACK] {
+        lanes(values, self.at)
+    }
+
+    #[inline(always)]
+    fn set(&self, values: &mut [T], begin: usize, new: [T; PACK]) {
+        values[self.at - begin..][..PACK].copy_from_slice(&new);
+    }
+
+    #[inline(always)]
+    fn inverse(&self, entry: usize, lane: usize) -> T {
+        self.inverse[entry][lane]
+    }
+}
+
 /// Hands `K u` of the particles in a group to the task.
 pub fn pass<T: Real>(
     matrix: &Matrix,
@@ -212,13 +235,12 @@ fn over_runs<T: Real>(
             several::<T, NARROW>(blocks, distances, inverse, at, u, task);
             at += NARROW;
         }
-        if at + NARROWEST <= end {
+        // What is left is computed with some of those before it once more, which takes less time than one by one.
+        if at < end && run.len as usize >= NARROW {
+            several::<T, NARROW>(blocks, distances, inverse, end - NARROW, u, task);
+        } else if at < end {
             several::<T, NARROWEST>(blocks, distances, inverse, at, u, task);
-            at += NARROWEST;
-        }
-        while at < end {
-            single(blocks, distances, inverse, at, u, task);
-            at += 1;
+            several::<T, NARROWEST>(blocks, distances, inverse, end - NARROWEST, u, task);
         }
     }
 }
@@ -234,20 +256,33 @@ fn over_packs<T: Real>(
 ) {
     // One length, so that an index is compared with it once for both components.
     let (of_x, of_y) = (u.x, &u.y[..u.x.len()]);
-    let packs = matrix.packs.of_group(group);
-    for (pack, inverse) in matrix.packs.all()[packs.clone()].iter().zip(&stencils.packed_inverse[packs]) {
-        let (mut x, mut y) = ([T::default(); PACK], [T::default(); PACK]);
-        let terms = pack.terms.start as usize..pack.terms.end as usize;
-        for ([xx, yx, xy, yy], from) in stencils.packed[terms.clone()].iter().zip(matrix.packs.read_by(terms))
-        {
-            let (ux, uy): ([T; PACK], [T; PACK]) =
-                (from.map(|i| of_x[i as usize]), from.map(|i| of_y[i as usize]));
-            for k in 0..PACK {
-                x[k] += xx[k] * ux[k] + xy[k] * uy[k];
-                y[k] += yx[k] * ux[k] + yy[k] * uy[k];
-            }
+    let all = matrix.packs();
+    let packs = all.of_group(group);
+    for (pack, inverse) in all.all()[packs.clone()].iter().zip(&stencils.packed_inverse[packs]) {
+        let mut sum = [[T::default(); PACK]; 2];
+        let (rows, gathers) = all.read_by(pack);
+        let (of_rows, of_gathers) = stencils.packed[pack.terms()].split_at(rows.len());
+        for (block, &first) in of_rows.iter().zip(rows) {
+            add_lanes(block, [lanes(of_x, first as usize), lanes(of_y, first as usize)], &mut sum);
         }
-        task.take(&Packed { particles: &pack.particles, inverse }, &x, &y);
+        for (block, from) in of_gathers.iter().zip(gathers) {
+            add_lanes(block, [from.map(|i| of_x[i as usize]), from.map(|i| of_y[i as usize])], &mut sum);
+        }
+        let [x, y] = &sum;
+        match pack.is_in_a_row {
+            true => task.take(&PackedInARow { at: pack.particles[0] as usize, inverse }, x, y),
+            false => task.take(&Packed { particles: &pack.particles, inverse }, x, y),
+        }
+    }
+}
+
+/// Adds the product of a block of each lane and what the lane reads.
+#[inline(always)]
+fn add_lanes<T: Real>(block: &[[T; PACK]; 4], [ux, uy]: [[T; PACK]; 2], [x, y]: &mut [[T; PACK]; 2]) {
+    let [xx, yx, xy, yy] = block;
+    for k in 0..PACK {
+        x[k] += xx[k] * ux[k] + xy[k] * uy[k];
+        y[k] += yx[k] * ux[k] + yy[k] * uy[k];
     }
 }
 
@@ -266,29 +301,6 @@ fn several<T: Real, const W: usize>(
         add_product([xx, xy, yx, yy], &[lanes(u.x, from), lanes(u.y, from)], &mut sum);
     }
     task.take(&InARow { at, inverse }, &sum[0], &sum[1]);
-}
-
-/// One particle, as those along an outline are.
-#[inline(always)]
-fn single<T: Real>(
-    blocks: &[[T; 4]],
-    distances: &[i32],
-    inverse: &[T; 4],
-    at: usize,
-    u: VectorsRef<'_, T>,
-    task: &mut impl Task<T>,
-) {
-    // The products of a block side by side, and each summed by itself.
-    let mut sums = [T::default(); 4];
-    for (block, &distance) in blocks.iter().zip(distances) {
-        let from = at.wrapping_add_signed(distance as isize);
-        let (ux, uy) = (u.x[from], u.y[from]);
-        let factors = [ux, ux, uy, uy];
-        for k in 0..4 {
-            sums[k] += block[k] * factors[k];
-        }
-    }
-    task.take(&InARow { at, inverse }, &[sums[0] + sums[2]], &[sums[1] + sums[3]]);
 }
 
 /// `K u` of one particle.

@@ -3,14 +3,14 @@
 
 use std::collections::HashMap;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-use super::columns::{Begin, Columns, groups};
+use super::columns::{Begin, Columns, Finder, groups};
 use super::outliers::Outliers;
 use super::packs::Packs;
 use super::rows::{RowRef, Rows};
 use super::window::{Census, Name, Window, cost_of, name_of};
-use super::{Operator, Stretch, add};
+use super::{Operator, Stretch};
 use crate::flock::block::Block;
 use crate::flock::body::Body;
 use crate::flock::lattice::Site;
@@ -65,7 +65,7 @@ pub struct Run {
 }
 
 /// Particles from which on a run is gone over by itself; those of shorter ones are packed.
-const LONG: u32 = 4;
+pub(super) const LONG: u32 = 4;
 
 impl Run {
     /// Whether its particles are in packs.
@@ -85,16 +85,13 @@ pub struct Matrix {
     pub rows: Rows,
     /// Of each row, the same wherever it is computed; empty of a coarser grid that one rank has whole.
     pub names: Vec<Name>,
-    runs: Vec<Run>,
-    distances: Vec<i32>,
     /// Index bounds of the groups of columns that threads work on, shape \[groups + 1\].
     pub bounds: Vec<usize>,
     /// First column of each group, shape \[groups + 1\].
     pub group_columns: Vec<i32>,
-    /// First run of each group, shape \[groups + 1\].
-    group_runs: Vec<usize>,
-    /// Particles of short runs.
-    pub packs: Packs,
+    /// What passes go over, made when it is first asked for: the next coarser grid does not wait for it.
+    runs: OnceLock<RunTable>,
+    packs: OnceLock<Packs>,
     pub outliers: Outliers,
     /// The part of this rank while several iterate with it; what they compute outside it is not known here.
     pub part: Option<Arc<Part>>,
@@ -105,22 +102,7 @@ pub struct Matrix {
 impl Matrix {
     /// `columns` hold the particles that have a class, and the entries of every row lead to such.
     pub fn compile(columns: Columns, class: Vec<u32>, rows: Rows) -> Self {
-        let mut runs = Runs::default();
-        for (column, segment) in columns.iter() {
-            runs.find(
-                (&columns, &class, &rows),
-                [column, segment.row],
-                segment.start..segment.start + segment.len,
-            );
-        }
-        Self::of_runs(columns, class, rows, runs)
-    }
-
-    fn of_runs(columns: Columns, class: Vec<u32>, rows: Rows, Runs { runs, distances, .. }: Runs) -> Self {
-        let names = Vec::new();
-        let mut matrix = Self { runs, distances, ..Self::uncompiled(columns, class, (rows, names)) };
-        matrix.group(group_size);
-        matrix
+        Self::uncompiled(columns, class, (rows, Vec::new())).grouped(group_size)
     }
 
     /// The matrix of no particle.
@@ -128,19 +110,17 @@ impl Matrix {
         Self::uncompiled(Columns::default(), Vec::new(), (Rows::default(), Vec::new()))
     }
 
-    /// The same without the runs that passes go over.
+    /// The same without groups that passes go over.
     pub fn uncompiled(columns: Columns, class: Vec<u32>, (rows, names): (Rows, Vec<Name>)) -> Self {
         Self {
             columns,
             class,
             rows,
             names,
-            runs: Vec::new(),
-            distances: Vec::new(),
             bounds: Vec::new(),
             group_columns: Vec::new(),
-            group_runs: Vec::new(),
-            packs: Packs::default(),
+            runs: OnceLock::new(),
+            packs: OnceLock::new(),
             outliers: Outliers::default(),
             part: None,
             window: None,
@@ -157,24 +137,16 @@ impl Matrix {
         let first = if self.count() == 0 { 0 } else { census.particles(self.columns.range()).start };
         let part = part(first);
         let (bounds, group_columns) = census.groups();
-        let [begin, end] = [part.groups().start, part.groups().end].map(|group| group_columns[group]);
-        let mut runs = Runs::default();
-        for (column, segment) in self.columns.segments(begin..end) {
-            let rows = (&self.columns, &self.class[..], &self.rows);
-            runs.find(rows, [column, segment.row], segment.start..segment.start + segment.len);
-        }
-        (self.runs, self.distances) = (runs.runs, runs.distances);
         self.bounds = bounds.iter().map(|bound| bound.saturating_sub(first).min(self.count())).collect();
         self.group_columns = group_columns;
         self.window = Some(Window { first, census: census.clone(), largest: 0.0 });
         self.part = Some(Arc::new(part));
-        self.pack();
         self
     }
 
     /// The same with the largest entry on the diagonal of a row of any rank.
     pub fn with_largest(mut self, team: &Team) -> Self {
-        let own = self.runs.iter().map(|run| largest_on_diagonal(self.rows.of(run.class)));
+        let own = self.runs().iter().map(|run| largest_on_diagonal(self.rows.of(run.class)));
         let [largest] = team.largest([own.fold(0.0, f64::max)]);
         self.window.iter_mut().for_each(|window| window.largest = largest);
         self
@@ -206,32 +178,25 @@ impl Matrix {
     }
 
     /// Cuts the body into groups that cost at least `size` of what all cost.
-    fn group(&mut self, size: impl FnOnce(u64) -> u64) {
+    fn grouped(mut self, size: impl FnOnce(u64) -> u64) -> Self {
         let mut sum = 0;
         let begins: Vec<Begin> = (self.columns.begins())
             .map(|(column, begin)| {
                 let before = sum;
-                sum += cost_of(self, column);
+                sum += cost_of(&self, column);
                 (column, begin, before)
             })
             .collect();
         let end = (self.columns.range().end, self.count(), sum);
         (self.bounds, self.group_columns) = groups(begins.into_iter(), end, size(sum));
-        self.pack();
-    }
-
-    /// Finds the runs of each group, and packs the short ones.
-    fn pack(&mut self) {
-        let first = |&bound: &usize| self.runs.partition_point(|run| (run.start as usize) < bound);
-        self.group_runs = self.bounds.iter().map(first).collect();
-        self.packs = Packs::new(self);
+        self
     }
 
     /// The same in groups of another size.
     #[cfg(test)]
-    pub fn regrouped(mut self, size: u64) -> Self {
-        self.group(|_| size);
-        self
+    pub fn regrouped(self, size: u64) -> Self {
+        let regrouped = self.grouped(|_| size);
+        Self { runs: OnceLock::new(), packs: OnceLock::new(), ..regrouped }
     }
 
     /// The rows of the operator without what they owe to held particles.
@@ -278,7 +243,9 @@ impl Matrix {
             runs.find((&columns, &class, &rows), site, start as u32..(start + len) as u32);
             None
         });
-        Self { outliers, names, ..Self::of_runs(columns, class, rows, runs) }
+        let matrix = Self { outliers, ..Self::uncompiled(columns, class, (rows, names)) }.grouped(group_size);
+        let runs = OnceLock::from(RunTable::new(runs, &matrix.bounds));
+        Self { runs, ..matrix }
     }
 
     pub fn count(&self) -> usize {
@@ -327,19 +294,39 @@ impl Matrix {
         }
     }
 
-    /// Runs of a group.
-    pub fn runs_of(&self, group: usize) -> &[Run] {
-        &self.runs[self.group_runs[group]..self.group_runs[group + 1]]
+    fn run_table(&self) -> &RunTable {
+        self.runs.get_or_init(|| {
+            let own = self.own_groups();
+            let [begin, end] = [own.start, own.end].map(|group| self.group_columns[group]);
+            let mut runs = Runs::default();
+            for (column, segment) in self.columns.segments(begin..end) {
+                let rows = (&self.columns, &self.class[..], &self.rows);
+                runs.find(rows, [column, segment.row], segment.start..segment.start + segment.len);
+            }
+            RunTable::new(runs, &self.bounds)
+        })
     }
 
+    /// Runs of a group.
+    pub fn runs_of(&self, group: usize) -> &[Run] {
+        let table = self.run_table();
+        &table.runs[table.of_groups[group]..table.of_groups[group + 1]]
+    }
+
+    /// Runs of the groups of this rank.
     pub fn runs(&self) -> &[Run] {
-        &self.runs
+        &self.run_table().runs
     }
 
     /// Index distances to a run's particles themselves (zero) and to their neighbours, in the order of
     /// the row's entries.
     pub fn distances(&self, run: &Run) -> &[i32] {
-        &self.distances[run.distances as usize..][..run.terms as usize]
+        &self.run_table().distances[run.distances as usize..][..run.terms as usize]
+    }
+
+    /// The particles of short runs.
+    pub fn packs(&self) -> &Packs {
+        self.packs.get_or_init(|| Packs::new(self))
     }
 
     /// Most columns from a particle to another that its row leads to, of the rows that are compiled.
@@ -353,7 +340,7 @@ impl Matrix {
             let others = self.distances(run)[1..].iter();
             others.map(|&distance| (column(run.start.wrapping_add_signed(distance)) - here).abs()).max()
         };
-        self.runs.iter().filter_map(of_run).max().unwrap_or(0)
+        self.runs().iter().filter_map(of_run).max().unwrap_or(0)
     }
 
     /// Most columns and rows that an entry between two sites of the lattice reaches.
@@ -368,6 +355,23 @@ fn largest_on_diagonal(row: RowRef<'_>) -> f64 {
     row.diagonal[0][0].abs().max(row.diagonal[1][1].abs())
 }
 
+/// The runs of a matrix.
+#[derive(Clone, Debug)]
+struct RunTable {
+    runs: Vec<Run>,
+    distances: Vec<i32>,
+    /// First run of each group, shape \[groups + 1\].
+    of_groups: Vec<usize>,
+}
+
+impl RunTable {
+    fn new(Runs { runs, distances, .. }: Runs, bounds: &[usize]) -> Self {
+        let first = |&bound: &usize| runs.partition_point(|run| (run.start as usize) < bound);
+        let of_groups = bounds.iter().map(first).collect();
+        Self { runs, distances, of_groups }
+    }
+}
+
 /// Runs that are being found.
 #[derive(Default)]
 struct Runs {
@@ -375,6 +379,7 @@ struct Runs {
     distances: Vec<i32>,
     /// Where the distances last used with each class lie: most columns are like the one before.
     last: Vec<Option<usize>>,
+    finder: Finder,
 }
 
 impl Runs {
@@ -403,8 +408,9 @@ impl Runs {
             let site = [site[0], site[1] + columns.step() * (start - particles.start) as i32];
             found.clear();
             found.push(0);
+            self.finder.go(columns, site);
             for (offset, _) in rows.of(own).entries {
-                let (there, room) = columns.find(add(site, *offset)).expect("rows lead to followers");
+                let (there, room) = self.finder.find(columns, *offset).expect("rows lead to followers");
                 len = len.min(room);
                 found.push(there as i32 - start as i32);
             }

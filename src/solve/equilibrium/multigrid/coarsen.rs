@@ -7,13 +7,15 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use super::descent::MOST_STEPS;
-use super::sums::Sums;
+use super::sums::{Sums, add};
 use super::transfer::{OutlierShares, Transfer, parents_of_place};
 use crate::flock::block::Block;
 use crate::flock::body::Body;
 use crate::flock::lattice::Site;
 use crate::solve::equilibrium::steps::in_pieces;
-use crate::solve::operator::{Columns, HELD, Matrix, Outliers, RowRef, Rows, leads_to_outlier, name_of};
+use crate::solve::operator::{
+    Columns, HELD, Matrix, Name, Outliers, RowRef, Rows, leads_to_outlier, name_of,
+};
 
 /// Fewest rows of a coarse grid that a thread sums: what two threads share of their surroundings each computes for itself.
 const PIECE: usize = 64;
@@ -83,16 +85,17 @@ fn nodes_of(fine: &Matrix, transfer: Transfer, of_outliers: &OutlierParents, col
     // Those along an outline are most of the rows: the others come after them.
     nodes.iter_mut().for_each(|(_, class)| *class += singles.len() as u32);
     nodes.extend(singles.iter().zip(0..).map(|((node, _), class)| (*node, class)));
+    let product = |list: usize| Product::new(fine, &parents, of_outliers, list);
     let mut pieces = in_pieces(&singles, PIECE, |singles| {
-        let (mut rows, mut sums) = (Rows::with_capacity(singles.len(), NEIGHBOURS), Sums::default());
-        let mut halves = Halves::new(fine, &parents, of_outliers);
-        for (node, of_node) in singles {
-            halves.add_row(*node, of_node, &mut sums);
-            rows.push_blocks(sums.drain());
-        }
-        rows
+        let mut product = product(singles.len());
+        singles.iter().for_each(|&(node, of_node)| product.push_row_at(node, of_node));
+        product.rows
     });
-    pieces.extend(rows_of(fine, &parents, &patterns));
+    pieces.extend(in_pieces(&patterns, PIECE, |patterns| {
+        let mut product = product(patterns.len());
+        patterns.iter().for_each(|pattern| product.push_row_among(pattern));
+        product.rows
+    }));
     // Of the rows of a grid that one rank has whole nothing is asked by name.
     let names = match fine.names.is_empty() {
         true => Vec::new(),
@@ -110,18 +113,6 @@ fn nodes_of(fine: &Matrix, transfer: Transfer, of_outliers: &OutlierParents, col
     let columns = Columns::with_step(STEP, nodes.iter().map(|&(site, _)| site));
     let class = nodes.into_iter().map(|(_, class)| class).collect();
     Matrix::uncompiled(columns, class, (Rows::joined(pieces), names))
-}
-
-/// The rows of nodes with these surroundings, piece by piece.
-fn rows_of(fine: &Matrix, parents: &Parents, patterns: &[&[u32]]) -> Vec<Rows> {
-    in_pieces(patterns, PIECE, |patterns| {
-        let (mut rows, mut sums) = (Rows::with_capacity(patterns.len(), NEIGHBOURS), Sums::default());
-        for pattern in patterns {
-            galerkin(fine, parents, pattern, &mut sums);
-            rows.push_blocks(sums.drain());
-        }
-        rows
-    })
 }
 
 /// The nodes around the particles that stand at no site.
@@ -163,120 +154,112 @@ impl OutlierParents {
     }
 }
 
-/// Where a particle's row of `K P` lies.
-#[derive(Clone, Copy, Default)]
-struct Half {
-    /// Coarse column in which it was asked for.
-    column: i32,
-    start: u32,
-    len: u32,
-}
-
-/// Which of two lists is a column's.
-fn parity(column: i32) -> usize {
-    column.rem_euclid(2) as usize
-}
-
-/// Rows of `K P`, each computed when it is first asked for: up to four nodes have a share in a particle.
-struct Halves<'a> {
+/// Rows of `P' K P`, each summed in two steps: of `P' K` by particles, and these by the nodes that have a share in them.
+struct Product<'a> {
     fine: &'a Matrix,
     parents: &'a Parents,
     of_outliers: &'a OutlierParents,
-    /// Rows one after the other, by nodes: those that were asked for in this coarse column, and in the one before, lie in turn
-    /// in either list. Later ones do not ask for them again, or if they do they are computed anew.
-    lists: [Vec<(Site, Block)>; 2],
-    /// Where that of each particle lies, shape \[count\].
-    of_particle: Vec<Half>,
-    /// The column that is being summed.
-    column: i32,
-    /// The one that is being summed.
-    sums: Sums,
+    /// Of the row of `P' K` that is being summed: by offsets from the site of the node, ...
+    of_sites: Sums,
+    /// ... and by the rows of particles at no site in their column.
+    of_others: Vec<(i32, Block)>,
+    /// Of the row of `P' K P`, by offsets from the node.
+    of_nodes: Sums,
+    rows: Rows,
 }
 
-impl<'a> Halves<'a> {
-    fn new(fine: &'a Matrix, parents: &'a Parents, of_outliers: &'a OutlierParents) -> Self {
+impl<'a> Product<'a> {
+    fn new(fine: &'a Matrix, parents: &'a Parents, of_outliers: &'a OutlierParents, rows: usize) -> Self {
         Self {
             fine,
             parents,
             of_outliers,
-            lists: Default::default(),
-            of_particle: vec![Half::default(); fine.count()],
-            column: i32::MIN,
-            sums: Sums::default(),
+            of_sites: Sums::default(),
+            of_others: Vec::new(),
+            of_nodes: Sums::default(),
+            rows: Rows::with_capacity(rows, NEIGHBOURS),
         }
     }
 
-    /// Adds up the row of `P' K P` at a node.
-    fn add_row(&mut self, node: Site, outliers: &[Child], sums: &mut Sums) {
-        if self.column != node[0] {
-            self.column = node[0];
-            self.lists[parity(node[0])].clear();
-        }
-        let [across, along] = self.parents.steps;
-        let near = |k: usize, step: i32| node[k] * step - step + 1..node[k] * step + step;
-        for column in near(0, across) {
-            for row in near(1, along) {
-                let Some((i, _)) = self.fine.columns.find([column, row]) else { continue };
-                let hat = |axis: usize, at: i32| self.parents.hat(axis, at);
-                let share = hat(0, column - node[0] * across) * hat(1, row - node[1] * along);
-                self.add_half(node, [column, row], (i, share), sums);
+    /// Adds the row of a node, and of the particles at no site that it has a share in.
+    fn push_row_at(&mut self, node: Site, outliers: &[Child]) {
+        let steps = self.parents.steps;
+        let near = |k: usize| node[k] * steps[k] - steps[k] + 1..node[k] * steps[k] + steps[k];
+        let step = self.fine.columns.step();
+        for column in near(0) {
+            let Range { start: mut row, end } = near(1);
+            while row < end {
+                let Some((first, room)) = self.fine.columns.find([column, row]) else {
+                    row += 1;
+                    continue;
+                };
+                for class in &self.fine.class[first..first + room] {
+                    let at = [column - node[0] * steps[0], row - node[1] * steps[1]];
+                    self.add_particle(node, [column, row], (*class, self.parents.share(at)));
+                    row += step;
+                    if row >= end {
+                        break;
+                    }
+                }
             }
         }
         for &Child { particle, row, share, .. } in outliers {
-            self.add_half(node, [Body::ALONG_OUTLINE, row], (particle, share), sums);
+            self.add_particle(node, [Body::ALONG_OUTLINE, row], (self.fine.class[particle], share));
+        }
+        self.end_row(node);
+    }
+
+    /// The same of a node with these surroundings, from which no row leads to a particle at no site.
+    fn push_row_among(&mut self, pattern: &[u32]) {
+        let [across, along] = self.parents.steps;
+        let reach = 2 * along - 1;
+        for (k, &class) in pattern.iter().enumerate().filter(|(_, class)| **class != HELD) {
+            let at = [k as i32 / reach - across + 1, k as i32 % reach - along + 1];
+            self.add_particle([0, 0], at, (class, self.parents.share(at)));
+        }
+        self.end_row([0, 0]);
+    }
+
+    /// Adds what a node's share in a particle at a site brings to the row of `P' K`.
+    fn add_particle(&mut self, node: Site, site: Site, (class, share): (u32, f64)) {
+        let row = self.fine.rows.of(class);
+        let entries = row.entries.iter().map(|(offset, block)| (*offset, block, -share));
+        let [across, along] = self.parents.steps;
+        for (offset, block, share) in std::iter::once(([0, 0], row.diagonal, share)).chain(entries) {
+            let [column, row] = [site[0] + offset[0], site[1] + offset[1]];
+            if column != Body::ALONG_OUTLINE {
+                self.of_sites.add([column - node[0] * across, row - node[1] * along], share, block);
+                continue;
+            }
+            let at = self.of_others.iter().position(|(other, _)| *other == row).unwrap_or_else(|| {
+                self.of_others.push((row, Block::default()));
+                self.of_others.len() - 1
+            });
+            add(&mut self.of_others[at].1, share, block);
         }
     }
 
-    /// Adds a particle's row of `K P` by offsets from a node that has a share in it.
-    fn add_half(&mut self, node: Site, site: Site, (i, share): (usize, f64), sums: &mut Sums) {
-        let mut half = self.of_particle[i];
-        if half.len == 0 || half.column < self.column - 1 {
-            half = self.find(node, site, i);
-            self.of_particle[i] = half;
+    /// Ends the row of a node.
+    fn end_row(&mut self, node: Site) {
+        let of_nodes = &mut self.of_nodes;
+        for (offset, block) in self.of_sites.drain() {
+            let (first, shares) = self.parents.around(offset);
+            of_nodes.add_around(first, shares, &block);
         }
-        let Half { column, start, len } = half;
-        for (other, block) in &self.lists[parity(column)][start as usize..][..len as usize] {
-            sums.add([other[0] - node[0], other[1] - node[1]], share, block);
+        for (row, block) in self.of_others.drain(..) {
+            let around = &self.of_outliers.nodes[row as usize];
+            let first = around[0].0;
+            let from_node = [first[0] - node[0], first[1] - node[1]];
+            of_nodes.add_around(from_node, around.map(|(_, share)| share), &block);
         }
-    }
-
-    /// Computes a particle's row of `K P`, summed by offsets from a node close to it.
-    fn find(&mut self, near: Site, site: Site, i: usize) -> Half {
-        let row = self.fine.rows.of(self.fine.class[i]);
-        self.add_parents(near, site, (1.0, row.diagonal));
-        for (offset, block) in row.entries {
-            self.add_parents(near, [site[0] + offset[0], site[1] + offset[1]], (-1.0, block));
-        }
-        let list = &mut self.lists[parity(self.column)];
-        let start = list.len() as u32;
-        let absolute = |(offset, block): (Site, Block)| ([offset[0] + near[0], offset[1] + near[1]], block);
-        list.extend(self.sums.drain().map(absolute));
-        Half { column: self.column, start, len: list.len() as u32 - start }
-    }
-
-    /// Adds a block by the nodes that have a share in the particle at a site, as offsets from one of them.
-    fn add_parents(&mut self, near: Site, site: Site, (sign, block): (f64, &Block)) {
-        let sums = &mut self.sums;
-        if site[0] != Body::ALONG_OUTLINE {
-            let steps = self.parents.steps;
-            let from_near = [0, 1].map(|axis| site[axis] - near[axis] * steps[axis]);
-            let (node, shares) = self.parents.around(from_near, sign);
-            return sums.add_around(node, shares, block);
-        }
-        let nodes = &self.of_outliers.nodes[site[1] as usize];
-        let first = nodes[0].0;
-        sums.add_around(
-            [first[0] - near[0], first[1] - near[1]],
-            nodes.map(|(_, share)| sign * share),
-            block,
-        );
+        self.rows.push_blocks(of_nodes.drain());
     }
 }
 
 /// The different surroundings of nodes: classes of the fine particles within reach, column by column.
 struct Patterns {
     transfer: Transfer,
-    known: HashMap<Vec<u32>, u32>,
+    known: HashMap<Name, u32>,
     /// One after the other.
     all: Vec<u32>,
     /// Classes of the fine columns within reach of a coarse one, row by row.
@@ -358,34 +341,16 @@ impl Patterns {
                     node(row, None);
                     continue;
                 }
-                before = match self.known.get(&pattern) {
-                    Some(&class) => class,
-                    None => {
-                        let class = self.known.len() as u32;
-                        self.all.extend(&pattern);
-                        self.known.insert(pattern.clone(), class);
-                        class
-                    }
-                };
+                let next = self.known.len() as u32;
+                before = *self
+                    .known
+                    .entry(name_of(pattern.iter().map(|&class: &u32| class.into())))
+                    .or_insert(next);
+                if before == next {
+                    self.all.extend(&pattern);
+                }
             }
             node(row, Some(before));
-        }
-    }
-}
-
-/// Adds up the row of `P' K P` at a node with these surroundings.
-fn galerkin(fine: &Matrix, parents: &Parents, pattern: &[u32], sums: &mut Sums) {
-    let [across, along] = parents.steps;
-    let reach = 2 * along - 1;
-    for (k, &class) in pattern.iter().enumerate().filter(|(_, class)| **class != HELD) {
-        let own = [k as i32 / reach - across + 1, k as i32 % reach - along + 1];
-        let share = parents.hat(0, own[0]) * parents.hat(1, own[1]);
-        let row = fine.rows.of(class);
-        let entries = row.entries.iter().map(|(offset, block)| (*offset, block, -share));
-        for (offset, block, share) in std::iter::once(([0, 0], row.diagonal, share)).chain(entries) {
-            let there = [own[0] + offset[0], own[1] + offset[1]];
-            let (node, shares) = parents.around(there, share);
-            sums.add_around(node, shares, block);
         }
     }
 }
@@ -423,6 +388,11 @@ impl Parents {
         self.hats[axis][at.unsigned_abs() as usize]
     }
 
+    /// Share of a node in what lies so many columns and rows away.
+    fn share(&self, at: Site) -> f64 {
+        self.hat(0, at[0]) * self.hat(1, at[1])
+    }
+
     fn find(&self, axis: usize, at: i32) -> Beside {
         let step = self.steps[axis];
         let (node, beyond) = (at.div_euclid(step), at.rem_euclid(step));
@@ -434,13 +404,12 @@ impl Parents {
         known.copied().unwrap_or_else(|| self.find(axis, at))
     }
 
-    /// The node at a site or before it both ways, and `weight` times the shares of this one, of the next along the column, of
-    /// that in the next column and of the one beyond both.
+    /// The node at a site or before it both ways, and the shares of this one, of the next along the column, of that in the
+    /// next column and of the one beyond both.
     #[inline(always)]
-    fn around(&self, site: Site, weight: f64) -> (Site, [f64; 4]) {
+    fn around(&self, site: Site) -> (Site, [f64; 4]) {
         let (columns, rows) = (self.along(0, site[0]), self.along(1, site[1]));
-        let [near, far] = columns.shares.map(|share| weight * share);
-        let [below, above] = rows.shares;
+        let ([near, far], [below, above]) = (columns.shares, rows.shares);
         ([columns.node, rows.node], [near * below, near * above, far * below, far * above])
     }
 }

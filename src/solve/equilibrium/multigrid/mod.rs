@@ -42,8 +42,8 @@ use crate::solve::part::{Halo, Part};
 use crate::solve::stopwatch::Stopwatch;
 
 /// Lanczos steps for the largest eigenvalue of each level, and what its estimate is raised by.
-const ESTIMATE: usize = 12;
-const SAFETY: f64 = 1.04;
+const ESTIMATE: usize = 8;
+const SAFETY: f64 = 1.06;
 
 /// Largest over smallest eigenvalue that the smoother is to dampen; what is below is left to the coarser
 /// level.
