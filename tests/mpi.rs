@@ -5,7 +5,6 @@
 
 #![cfg(all(feature = "cli", feature = "mpi"))]
 
-use std::collections::HashMap;
 use std::hash::{BuildHasher, RandomState};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -21,6 +20,7 @@ use flockform::engine::state::EngineState;
 use flockform::export::checkpoint::{Checkpoint, RunRequest};
 use flockform::scene::bundled;
 use folders::{files, names_in, temporary};
+use process::status;
 use running::Running;
 use signals::signal;
 use waits::within;
@@ -31,6 +31,8 @@ mod command;
 mod folders;
 #[path = "common/json.rs"]
 mod json;
+#[path = "common/process.rs"]
+mod process;
 #[path = "common/running.rs"]
 #[allow(dead_code, reason = "a launcher is not asked to end")]
 mod running;
@@ -493,18 +495,11 @@ fn assert_resumes(ranks: usize, folder: &Path, expected: &Path, what: &str) {
     assert_same(&folder.join("o"), &expected.join("o"), what);
 }
 
-/// What the system says of a process that has not ended, by its own words for it.
-fn status_of(process: u32) -> Option<HashMap<String, String>> {
-    let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
-    let lines = status.lines().filter_map(|line| line.split_once(':'));
-    Some(lines.map(|(name, value)| (name.to_owned(), value.trim().to_owned())).collect())
-}
-
 /// Whether a signal that asks a frozen process to end waits for it.
-fn is_asked_to_end(status: &HashMap<String, String>) -> bool {
+fn is_asked_to_end(process: u32) -> bool {
     const INT: u64 = 1 << 1;
     const TERM: u64 = 1 << 14;
-    let waiting = u64::from_str_radix(&status["ShdPnd"], 16).expect("bits");
+    let waiting = status(process, "ShdPnd").map_or(0, |bits| u64::from_str_radix(&bits, 16).expect("bits"));
     waiting & (INT | TERM) != 0
 }
 
@@ -611,11 +606,11 @@ fn an_interrupt_of_the_launcher_ends_the_run_which_goes_on_to_the_same_bits() {
     // Open MPI has the ranks go on, and passes the interrupt to them a second later.
     within(PATIENCE, "an interrupt of the ranks", || {
         // Half a second later the others have ended, and this one with them.
-        let Some(status) = status_of(ranks[1]) else { return Some(()) };
-        if !status["State"].starts_with('T') {
+        let state = status(ranks[1], "State");
+        if state.as_ref().is_some_and(|state| state != "T") {
             signals::is_sent("STOP", ranks[1]);
         }
-        is_asked_to_end(&status).then_some(())
+        (state.is_none() || is_asked_to_end(ranks[1])).then_some(())
     });
     signals::is_sent("CONT", ranks[1]);
     let interrupted = Instant::now();

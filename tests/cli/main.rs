@@ -22,6 +22,9 @@ mod measured;
 #[cfg(target_os = "linux")]
 mod memory;
 mod points;
+#[cfg(target_os = "linux")]
+#[path = "../common/process.rs"]
+mod process;
 mod program;
 #[cfg(not(feature = "mpi"))]
 mod ranks;

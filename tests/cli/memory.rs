@@ -5,23 +5,24 @@ use std::time::Duration;
 
 use super::command::command;
 use super::folders::temporary;
+use super::process::status;
 
 /// The largest that a process has been, once it has ended \[byte\].
 fn peak(mut child: Child) -> f64 {
-    let status = format!("/proc/{}/status", child.id());
     let mut most = 0.0_f64;
     loop {
-        let text = std::fs::read_to_string(&status).unwrap_or_default();
-        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-        let kibibytes = line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok());
+        let kibibytes = status(child.id(), "VmHWM").and_then(|kibibytes| kibibytes.parse::<f64>().ok());
         most = most.max(1024.0 * kibibytes.unwrap_or(0.0));
-        if let Some(status) = child.try_wait().expect("a child") {
-            assert!(status.success(), "{status}");
+        if let Some(ended) = child.try_wait().expect("a child") {
+            assert!(ended.success(), "{ended}");
             return most;
         }
         std::thread::sleep(Duration::from_millis(1));
     }
 }
+
+/// Most runs of which one has to take what is predicted.
+const TRIES: u32 = 10;
 
 /// Lines that are off by more than a tenth, on so many threads: as many pictures are drawn at once.
 fn off(threads: &str, scene: &str, sets: &[&str]) -> Vec<String> {
@@ -40,8 +41,9 @@ fn off(threads: &str, scene: &str, sets: &[&str]) -> Vec<String> {
         let run = [&["run", scene, "--quiet", "--force", "--out", key], flags, &sets].concat();
         let predicted = plan["memory_bytes"][key].as_f64().expect("a number");
         let mut found = 0.0_f64;
-        // On a busy computer the last of a short process is not seen: what is seen is never more than it took.
-        for _ in 0..3 {
+        // On a busy computer the last of a short process is not seen, nor do two threads draw at once: what is seen is never more
+        // than it takes.
+        for _ in 0..TRIES {
             if found < 0.95 * predicted {
                 let child = on_threads(&run).stdout(Stdio::null()).spawn().expect("starts");
                 found = found.max(peak(child));

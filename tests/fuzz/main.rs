@@ -8,6 +8,8 @@
 mod checkpoints;
 #[path = "../common/folders.rs"]
 mod folders;
+#[path = "../common/process.rs"]
+mod process;
 mod recordings;
 #[path = "../common/scenes.rs"]
 mod scenes;
@@ -19,6 +21,8 @@ use std::time::{Duration, Instant};
 
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+
+use process::status;
 
 /// Longest time that one damaged file may take to be read or refused; unoptimised, on a machine with other things to do.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -123,6 +127,5 @@ fn damaged(good: &[u8], damage: &[Damage]) -> Vec<u8> {
 
 /// Peak memory of this process so far [kB], where the system tells it.
 fn peak() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?.split_whitespace().next()?.parse().ok()
+    status(std::process::id(), "VmHWM")?.parse().ok()
 }

@@ -14,6 +14,8 @@ mod middleware;
 #[path = "../ros_edge/support.rs"]
 #[expect(dead_code, reason = "the client of another implementation is all that is needed of it")]
 mod peers;
+#[path = "../common/process.rs"]
+mod process;
 #[path = "../common/running.rs"]
 mod running;
 #[path = "../common/signals.rs"]

@@ -9,6 +9,7 @@ use std::time::Duration;
 use flockform::ros::edge::{Edge, Options};
 use flockform::scene::swarm::Swarm;
 
+use crate::process::status;
 pub use crate::running::Running;
 pub use crate::signals::{is_sent, signal};
 pub use crate::stranger::{Stranger, hidden, port};
@@ -95,17 +96,12 @@ fn has_begun(process: u32) -> bool {
 }
 
 fn parent(process: u32) -> Option<u32> {
-    status(process, "PPid:")
+    status(process, "PPid")?.parse().ok()
 }
 
 /// Memory in use [kB].
 pub fn resident(process: u32) -> u32 {
-    status(process, "VmRSS:").unwrap_or(0)
-}
-
-fn status(process: u32, key: &str) -> Option<u32> {
-    let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
-    status.lines().find_map(|line| line.strip_prefix(key))?.split_whitespace().next()?.parse().ok()
+    status(process, "VmRSS").map_or(0, |kibibytes| kibibytes.parse().expect("a number"))
 }
 
 pub const PATIENCE: Duration = Duration::from_secs(30);

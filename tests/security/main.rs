@@ -12,6 +12,8 @@ mod enclaves;
 mod exchange;
 mod keystore;
 mod nodes;
+#[path = "../common/process.rs"]
+mod process;
 #[path = "../common/running.rs"]
 #[expect(dead_code, reason = "the processes here end by the end of their input")]
 mod running;

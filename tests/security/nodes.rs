@@ -17,6 +17,7 @@ use flockform::ros::robots::{Layout, RobotNodes};
 
 use super::exchange::{domain, plain, secured};
 use super::keystore::*;
+use super::process::status;
 use super::running::Running;
 use super::stranger::{Stranger, hidden, port};
 use super::swarms::load_swarm;
@@ -70,9 +71,7 @@ fn start(part: &str, domain: u16, keystore: &Path) -> Running {
 
 /// Memory in use of a process \[kB\].
 fn resident(running: &Running) -> u32 {
-    let status = std::fs::read_to_string(format!("/proc/{}/status", running.0.id())).unwrap_or_default();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
-    line.and_then(|line| line.split_whitespace().next()?.parse().ok()).unwrap_or(0)
+    status(running.0.id(), "VmRSS").map_or(0, |kibibytes| kibibytes.parse().expect("a number"))
 }
 
 /// Takes part in the network and counts what of a flight it hears.
