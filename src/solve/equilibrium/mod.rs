@@ -205,7 +205,7 @@ struct Found {
 
 /// Finds the equilibrium of a system.
 pub fn solve(system: &System, request: &Request) -> Result<Solved, SolveError> {
-    solve_shared(system, request, None)
+    steps::in_pool(|| solve_shared(system, request, None))
 }
 
 /// The same shared with the other ranks of a team, which all have the same system, or each a part of it: the same bits on every

@@ -23,6 +23,11 @@ pub fn side_by_side<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOn
     if rayon::current_num_threads() > 1 { rayon::join(a, b) } else { (a(), b()) }
 }
 
+/// Does some work on a thread of the pool: from outside each of its passes would wake others and wait to be woken.
+pub fn in_pool<R: Send>(work: impl FnOnce() -> R + Send) -> R {
+    if rayon::current_num_threads() > 1 { rayon::scope(|_| work()) } else { work() }
+}
+
 /// Pieces that each thread is given of a list: those of a thread that has something else to do are another's.
 const PIECES: usize = 4;
 
