@@ -232,9 +232,11 @@ impl Terms {
             }
             let mut next = 0;
             for &distance in distances {
+                // A row may lead to one particle more than once.
+                let is_free = |&(at, read_by): &(i32, u8)| at == distance && read_by & 1 << lane == 0;
                 // Neighbours lead to others in the same order, but for those at which something ends.
-                let is_next = known.get(next).is_some_and(|(at, _)| *at == distance);
-                let at = if is_next { Some(next) } else { known.iter().position(|(at, _)| *at == distance) };
+                let is_next = known.get(next).is_some_and(is_free);
+                let at = if is_next { Some(next) } else { known.iter().position(is_free) };
                 let at = at.unwrap_or_else(|| {
                     known.push((distance, 0));
                     known.len() - 1

@@ -44,6 +44,22 @@ fn spring([x, y]: [f64; 2]) -> Block {
     ]
 }
 
+/// The same operator with a row of its own for each particle, some of which lead to each of their neighbours twice.
+pub fn with_own_rows(operator: &Operator) -> Operator {
+    let sites: Vec<Site> = operator.columns.sites().collect();
+    let row = |i: usize| {
+        let times = |block: Block, factor: f64| block.map(|row| row.map(|value| factor * value));
+        let (Row { diagonal, entries }, factor) = (operator.row(i), 1.0 + i as f64 / 1e5);
+        let shares: &[f64] = if i % 5 == 0 { &[0.25, 0.75] } else { &[1.0] };
+        let entry = |&(offset, block): &(Site, Block)| {
+            shares.iter().map(move |share| (offset, times(block, factor * share)))
+        };
+        Row { diagonal: times(diagonal, factor), entries: entries.iter().flat_map(entry).collect() }
+    };
+    let made = Operator::from_rows(&sites, operator.grid, operator.follows().to_vec(), row);
+    made.expect("an operator")
+}
+
 /// The same operator with some of its particles along an outline: after the others of their column, at no site, somewhat beside
 /// where they were; of some of the others one component is held.
 pub fn with_outliers(operator: &Operator) -> Operator {
