@@ -133,7 +133,7 @@ fn solved_weights_follow_every_affine_motion_and_equal_ones_shifts_alone() {
     let swarm = bundled_swarm("square").expect("bundled").load_swarm(&slow).expect("loads");
     let mut flight = Flight::new(&swarm).expect("laid out");
     let mut flown: f64 = 0.0;
-    while flight.fleet().time() < 30.0 {
+    while flight.fleet().time() < 60.0 {
         flight.step();
         let affine = flight.control().formation().affine(flight.fleet().time()).expect("a manoeuvre");
         let formation = flight.control().formation();
