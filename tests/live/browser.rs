@@ -149,7 +149,7 @@ fn a_formation_is_designed_and_the_file_is_the_design() {
     assert!(scout.neighbours.contains(&"robot_13".to_owned()), "{:?}", scout.neighbours);
     let led = |entry: &flockform::scene::swarm::raw::RawLeaders| entry.robots.contains(&"scout".to_owned());
     assert!(!swarm.raw.leaders.iter().any(led), "placed to lead, and told to follow");
-    assert_eq!((swarm.raw.robots.len(), swarm.raw.flight.duration), (26, Some(45.0)));
+    assert_eq!((swarm.raw.robots.len(), swarm.raw.flight.duration), (26, Some(75.0)));
     Flight::new(&swarm).unwrap_or_else(|error| panic!("{error}"));
 }
 
