@@ -198,8 +198,11 @@ struct Terms {
 
 impl Terms {
     fn clear(&mut self) {
-        let Self { rows, gathers, slots, known, places } = self;
-        (rows.clear(), gathers.clear(), slots.clear(), known.clear(), places.clear());
+        self.rows.clear();
+        self.gathers.clear();
+        self.slots.clear();
+        self.known.clear();
+        self.places.clear();
     }
 
     /// Of these lanes, each of which reads by itself.

@@ -50,7 +50,7 @@ pub fn with_own_rows(operator: &Operator) -> Operator {
     let row = |i: usize| {
         let times = |block: Block, factor: f64| block.map(|row| row.map(|value| factor * value));
         let (Row { diagonal, entries }, factor) = (operator.row(i), 1.0 + i as f64 / 1e5);
-        let shares: &[f64] = if i % 5 == 0 { &[0.25, 0.75] } else { &[1.0] };
+        let shares: &[f64] = if i.is_multiple_of(5) { &[0.25, 0.75] } else { &[1.0] };
         let entry = |&(offset, block): &(Site, Block)| {
             shares.iter().map(move |share| (offset, times(block, factor * share)))
         };
