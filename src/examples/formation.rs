@@ -17,7 +17,8 @@ fn main() -> Result<(), SceneError> {
     // Ideal robots: each is at its target one period later.
     let mut places: Vec<[f64; 2]> = (0..members).map(|member| control.wanted(member)).collect();
     // The corners are led by the manoeuvre of the swarm file: three legs, each followed by a hold.
-    for period in 0..1500 {
+    let periods = swarm.raw.flight.duration.unwrap_or(60.0) / control.period();
+    for period in 0..periods.round() as u32 {
         let now = f64::from(period) * control.period();
         for (member, &position) in places.iter().enumerate() {
             let pose = Pose { position, yaw: 0.0, stamp: now, frame_is_right: true };

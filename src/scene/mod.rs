@@ -9,6 +9,7 @@ pub mod bundled;
 pub mod document;
 pub mod points;
 pub mod raw;
+mod rows;
 pub mod swarm;
 pub mod table;
 pub mod text;

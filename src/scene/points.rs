@@ -1,5 +1,6 @@
 //! The particles of a body from a CSV file.
 
+use super::rows::Rows;
 use crate::flock::vectors::Vectors;
 
 /// Particles in the order of their rows.
@@ -18,46 +19,26 @@ impl PointTable {
     /// # Errors
     /// A sentence that names the line and what is wrong with it.
     pub fn parse(text: &str, scale: f64) -> Result<Self, String> {
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
-        let [x, y, id] = columns(reader.headers().map_err(|error| error.to_string())?)?;
+        let rows = Rows::of(text)?;
+        let id = rows.column("id");
+        let (Some(x), Some(y), true) =
+            (rows.column("x"), rows.column("y"), rows.header.len() == 2 + usize::from(id.is_some()))
+        else {
+            return Err(format!("line 1: the header is `{}`, not `x,y` or `id,x,y`", rows.header_line()));
+        };
         let (mut points, mut ids, mut lines) = (Vectors::default(), Vec::new(), Vec::new());
-        for (row, record) in reader.records().enumerate() {
-            let record = record.map_err(|error| error.to_string())?;
-            let line = record.position().map_or(row as u64 + 2, csv::Position::line);
-            let coordinate = |column: Option<usize>, name: &str| {
-                let text = &record[column.unwrap_or_default()];
-                // The sum makes 0.0 of -0.0, which is the same place.
-                let value = text.parse::<f64>().ok().map(|value| scale * value + 0.0);
-                value
-                    .filter(|value| value.is_finite())
-                    .ok_or_else(|| format!("line {line}: `{name}` = `{text}` is not a finite number"))
-            };
-            points.push([coordinate(x, "x")?, coordinate(y, "y")?]);
-            ids.push(match id.map(|column| &record[column]) {
-                None => row as u32 + 1,
-                Some(text) => text.parse().ok().filter(|&id| id > 0).ok_or_else(|| {
-                    format!("line {line}: `id` = `{text}` is not a whole number from 1 to {}", u32::MAX)
-                })?,
-            });
-            lines.push(line);
-        }
+        rows.each(|row| {
+            points.push([row.number(x, scale)?, row.number(y, scale)?]);
+            ids.push(id.map_or(Ok(ids.len() as u32 + 1), |id| row.id(id))?);
+            lines.push(row.line);
+            Ok(())
+        })?;
         if points.is_empty() {
             return Err("there is no point below the header".into());
         }
         require_different(&points, &ids, &lines)?;
         Ok(Self { points, ids })
     }
-}
-
-/// Columns of `x`, `y` and `id`; only the last may be missing.
-fn columns(header: &csv::StringRecord) -> Result<[Option<usize>; 3], String> {
-    let found = ["x", "y", "id"].map(|name| header.iter().position(|known| known == name));
-    let known = found.iter().flatten().count();
-    if found[0].is_none() || found[1].is_none() || known != header.len() {
-        let header = header.iter().collect::<Vec<_>>().join(",");
-        return Err(format!("line 1: the header is `{header}`, not `x,y` or `id,x,y`"));
-    }
-    Ok(found)
 }
 
 /// Refuses two points in one place and two of one name; of several pairs it names the first in the file.
@@ -112,6 +93,6 @@ mod tests {
         assert_eq!(error("id,x,y\n1,1,1\n2,0,1\n1,2,2\n"), "lines 2 and 4: both have `id` = 1");
         assert_eq!(error("x,y\n5,5\n0,1\n-0,1\n5,5\n"), "lines 3 and 4: both are at (0, 1)");
         assert_eq!(error("x,y\n"), "there is no point below the header");
-        assert!(error("x,y\n1\n").contains("line: 2"), "{}", error("x,y\n1\n"));
+        assert_eq!(error("x,y\n\n1\n"), "line 3: 1 values below a header of 2");
     }
 }

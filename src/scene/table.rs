@@ -1,5 +1,6 @@
 //! Displacements of leaders from a CSV file.
 
+use super::rows::Rows;
 use crate::flock::body::Body;
 use crate::flock::vectors::distance;
 
@@ -19,42 +20,26 @@ impl DisplacementTable {
     /// # Errors
     /// A sentence that names the line and what is wrong with it.
     pub fn parse(text: &str, scale: f64) -> Result<Self, String> {
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
-        let header =
-            reader.headers().map_err(|e| e.to_string())?.iter().map(str::to_owned).collect::<Vec<_>>();
-        let by_id = match header.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        let rows = Rows::of(text)?;
+        let header: Vec<&str> = rows.header.iter().map(String::as_str).collect();
+        let by_id = match header[..] {
             ["id", "ux", "uy"] => true,
             ["x", "y", "ux", "uy"] => false,
             _ => {
-                return Err(format!(
-                    "line 1: the header is `{}`, not `x,y,ux,uy` or `id,ux,uy`",
-                    header.join(",")
-                ));
+                let header = rows.header_line();
+                return Err(format!("line 1: the header is `{header}`, not `x,y,ux,uy` or `id,ux,uy`"));
             }
         };
         let (mut places, mut ids) = (Vec::new(), Vec::new());
-        for (row, record) in reader.records().enumerate() {
-            let line = row + 2;
-            let record = record.map_err(|e| format!("line {line}: {e}"))?;
-            let number = |column: usize| -> Result<f64, String> {
-                let text = &record[column];
-                let value = text.parse::<f64>().ok().filter(|v| v.is_finite());
-                value.ok_or_else(|| {
-                    format!("line {line}: `{}` = `{text}` is not a finite number", header[column])
-                })
-            };
-            let last = header.len() - 1;
-            let displacement = [scale * number(last - 1)?, scale * number(last)?];
+        rows.each(|row| {
             if by_id {
-                let id = record[0].parse::<usize>().ok().filter(|&id| id > 0);
-                let id = id.ok_or_else(|| {
-                    format!("line {line}: `id` = `{}` is not a particle id (1, 2, ...)", &record[0])
-                })?;
-                ids.push((id, displacement));
+                ids.push((row.id(0)? as usize, [row.number(1, scale)?, row.number(2, scale)?]));
             } else {
-                places.push(([number(0)?, number(1)?], displacement));
+                let place = [row.number(0, 1.0)?, row.number(1, 1.0)?];
+                places.push((place, [row.number(2, scale)?, row.number(3, scale)?]));
             }
-        }
+            Ok(())
+        })?;
         Ok(if by_id { Self::ById(ids) } else { Self::ByPlace(places) })
     }
 
@@ -99,6 +84,9 @@ mod tests {
         let error = |text| DisplacementTable::parse(text, 1.0).expect_err("refused");
         assert_eq!(error("x,y,ux,uy\n1,2,nan,0\n"), "line 2: `ux` = `nan` is not a finite number");
         assert_eq!(error("a,b\n"), "line 1: the header is `a,b`, not `x,y,ux,uy` or `id,ux,uy`");
-        assert_eq!(error("id,ux,uy\n0,1,1\n"), "line 2: `id` = `0` is not a particle id (1, 2, ...)");
+        assert_eq!(
+            error("id,ux,uy\n0,1,1\n"),
+            "line 2: `id` = `0` is not a whole number from 1 to 4294967295"
+        );
     }
 }

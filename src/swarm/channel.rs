@@ -14,8 +14,6 @@ use crate::flock::splitmix;
 pub struct ChannelParams {
     /// Standard deviation of each coordinate \[m\], default 0.
     pub noise: f64,
-    /// Standard deviation of the heading \[rad\], default 0.
-    pub yaw_noise: f64,
     /// Periods that every pose takes \[1\], default 0.
     pub delay: u32,
     /// Up to so many periods more, all equally likely \[1\], default 0. Poses keep their order: one that
@@ -25,8 +23,6 @@ pub struct ChannelParams {
     pub loss: f64,
     /// Probability that it comes once more, a period later \[1\], default 0.
     pub duplication: f64,
-    /// Probability that it comes a period late, behind the next one \[1\], default 0.
-    pub reordering: f64,
 }
 
 /// The pose that a faulty robot sends in place of the true one; stamps stay true.
@@ -39,18 +35,6 @@ pub enum Lie {
     },
     /// The place at which it began to lie.
     Frozen,
-    /// Always this place \[m, world frame\].
-    Claimed {
-        /// Where it claims to be.
-        position: [f64; 2],
-    },
-    /// To and fro about where it is, `amplitude` \[m\] each way, in so many periods.
-    Oscillating {
-        /// Greatest deflection along x and y.
-        amplitude: [f64; 2],
-        /// Periods of one swing.
-        periods: u32,
-    },
     /// Anywhere within `radius` \[m\] of where it is.
     Random {
         /// Greatest distance from the true place.
@@ -77,23 +61,23 @@ pub enum Sender {
 pub struct Channel {
     params: ChannelParams,
     sender: Sender,
-    /// Place \[m\] and period at which the robot began to lie.
-    lying_since: Option<([f64; 2], u64)>,
+    /// Where the robot began to lie \[m\].
+    frozen_at: Option<[f64; 2]>,
     /// A stream for each cause: what is lost does not change the noise on what is not.
     noise: Pcg64Mcg,
     network: Pcg64Mcg,
     lies: Pcg64Mcg,
     /// In the order of arrival.
     on_the_way: Vec<Arrival>,
-    /// Arrival of the last pose that keeps its order \[period\].
-    last_in_order: u64,
+    /// Arrival of the last pose, duplicates left aside \[period\].
+    last: u64,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Arrival {
     period: u64,
-    /// Behind all that arrive in the same period in order.
-    late: bool,
+    /// Behind all that arrive in the same period for the first time.
+    is_again: bool,
     pose: Pose,
 }
 
@@ -104,12 +88,12 @@ impl Channel {
         Self {
             params,
             sender: Sender::Honest,
-            lying_since: None,
+            frozen_at: None,
             noise: stream(0),
             network: stream(1),
             lies: stream(2),
             on_the_way: Vec::new(),
-            last_in_order: 0,
+            last: 0,
         }
     }
 
@@ -126,7 +110,7 @@ impl Channel {
     /// From the next pose on.
     pub(crate) fn set_sender(&mut self, sender: Sender) {
         if sender != self.sender {
-            self.lying_since = None;
+            self.frozen_at = None;
         }
         self.sender = sender;
     }
@@ -141,27 +125,22 @@ impl Channel {
         let pose = match self.sender {
             Sender::Dead => return,
             Sender::Honest => pose,
-            Sender::Lying(lie) => self.twisted(lie, period, pose),
+            Sender::Lying(lie) => self.twisted(lie, pose),
         };
         let pose = self.noisy(pose);
-        // All drawn for every pose, so that one probability does not change what another decides.
-        let [lost, held_up, doubled, late] = [(); 4].map(|()| self.network.random::<f64>());
+        // All drawn for every pose, so that one probability does not change what another decides; one more than are needed, as
+        // recorded flights have it.
+        let [lost, held_up, doubled, _] = [(); 4].map(|()| self.network.random::<f64>());
         let params = &self.params;
         if lost < params.loss {
             return;
         }
         let jitter = (held_up * (f64::from(params.jitter) + 1.0)) as u64;
-        let in_order = self.last_in_order.max(period + u64::from(params.delay) + jitter);
-        let first = if late < params.reordering {
-            Arrival { period: in_order + 1, late: true, pose }
-        } else {
-            self.last_in_order = in_order;
-            Arrival { period: in_order, late: false, pose }
-        };
-        let again = doubled < params.duplication;
-        self.put(first);
-        if again {
-            self.put(Arrival { period: first.period + 1, late: true, pose });
+        self.last = self.last.max(period + u64::from(params.delay) + jitter);
+        let is_doubled = doubled < params.duplication;
+        self.put(Arrival { period: self.last, is_again: false, pose });
+        if is_doubled {
+            self.put(Arrival { period: self.last + 1, is_again: true, pose });
         }
     }
 
@@ -172,31 +151,24 @@ impl Channel {
     }
 
     fn put(&mut self, arrival: Arrival) {
-        let key = |a: &Arrival| (a.period, a.late);
+        let key = |a: &Arrival| (a.period, a.is_again);
         let place = self.on_the_way.partition_point(|other| key(other) <= key(&arrival));
         self.on_the_way.insert(place, arrival);
     }
 
     fn noisy(&mut self, pose: Pose) -> Pose {
-        let [x, y, turn] = [(); 3].map(|()| self.noise.sample::<f64, _>(StandardNormal));
-        Pose {
-            position: [pose.position[0] + self.params.noise * x, pose.position[1] + self.params.noise * y],
-            yaw: pose.yaw + self.params.yaw_noise * turn,
-            ..pose
-        }
+        // One more than is needed, as recorded flights have it.
+        let [x, y, _] = [(); 3].map(|()| self.noise.sample::<f64, _>(StandardNormal));
+        let noise = self.params.noise;
+        Pose { position: [pose.position[0] + noise * x, pose.position[1] + noise * y], ..pose }
     }
 
-    fn twisted(&mut self, lie: Lie, period: u64, pose: Pose) -> Pose {
-        let (place, since) = *self.lying_since.get_or_insert((pose.position, period));
+    fn twisted(&mut self, lie: Lie, pose: Pose) -> Pose {
+        let place = *self.frozen_at.get_or_insert(pose.position);
         let moved = |by: [f64; 2]| [pose.position[0] + by[0], pose.position[1] + by[1]];
         let position = match lie {
             Lie::Offset { by } => moved(by),
             Lie::Frozen => place,
-            Lie::Claimed { position } => position,
-            Lie::Oscillating { amplitude, periods } => {
-                let turn = period.saturating_sub(since) as f64 / f64::from(periods.max(1));
-                moved(amplitude.map(|a| a * (std::f64::consts::TAU * turn).sin()))
-            }
             Lie::Random { radius } => {
                 // The root spreads them evenly over the disc.
                 let [far, turn] = [(); 2].map(|()| self.lies.random::<f64>());
@@ -265,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn losses_duplicates_and_late_ones_come_as_often_as_asked() {
+    fn losses_and_duplicates_come_as_often_as_asked() {
         let periods = 20_000;
         let near = |count: usize, share: f64| (count as f64 / periods as f64 - share).abs() < 0.015;
         let lossy = |loss| stamps(ChannelParams { loss, ..Default::default() }, periods).len();
@@ -273,16 +245,11 @@ mod tests {
         assert_eq!((lossy(1.0), lossy(0.0)), (0, 20_000));
         let doubled = stamps(ChannelParams { duplication: 0.25, ..Default::default() }, periods);
         assert!(near(doubled.len(), 1.25), "{}", doubled.len());
-        let mixed = stamps(ChannelParams { reordering: 0.2, ..Default::default() }, periods);
-        let overtaken = mixed.windows(2).filter(|pair| pair[1] < pair[0]).count();
-        // A late one is overtaken by the next unless that is late too.
-        assert!(near(overtaken, 0.2 * 0.8), "{overtaken}");
-        assert!(near(mixed.len(), 1.0));
     }
 
     #[test]
     fn noise_has_the_deviation_asked_for_and_is_the_same_whatever_is_lost() {
-        let noise = ChannelParams { noise: 0.3, yaw_noise: 0.01, ..Default::default() };
+        let noise = ChannelParams { noise: 0.3, ..Default::default() };
         let heard_through = |params| heard(Channel::new(params, 5, 9), 20_000).concat();
         let all = heard_through(noise);
         let deviation = |error: &dyn Fn(&Pose) -> f64| {
@@ -290,22 +257,13 @@ mod tests {
         };
         assert!((deviation(&|p| p.position[0] - p.stamp) - 0.3).abs() < 0.01);
         assert!((deviation(&|p| p.position[1] - 1.0) - 0.3).abs() < 0.01);
-        assert!((deviation(&|p| p.yaw - 0.5) - 0.01).abs() < 0.001);
         let some = heard_through(ChannelParams { loss: 0.5, ..noise });
         assert!(some.len() < 11_000 && some.iter().all(|pose| *pose == all[pose.stamp as usize]));
     }
 
     #[test]
     fn a_channel_depends_on_its_seed_and_member_alone() {
-        let params = ChannelParams {
-            noise: 0.1,
-            delay: 1,
-            jitter: 3,
-            loss: 0.3,
-            duplication: 0.2,
-            reordering: 0.2,
-            ..Default::default()
-        };
+        let params = ChannelParams { noise: 0.1, delay: 1, jitter: 3, loss: 0.3, duplication: 0.2 };
         let alone = heard(Channel::new(params, 11, 4), 300);
         // Beside another that sends at its own pace, and asked more than once.
         let (mut one, mut other) = (Channel::new(params, 11, 4), Channel::new(params, 11, 5));
@@ -351,12 +309,7 @@ mod tests {
         };
         assert_eq!(sent(Lie::Offset { by: [10.0, -2.0] })[3], [14.0, -1.0]);
         assert_eq!(sent(Lie::Frozen), [[1.0, 1.0]; 8]);
-        assert_eq!(sent(Lie::Claimed { position: [99.0, 9.0] }), [[99.0, 9.0]; 8]);
         assert!(sent(Lie::NotANumber).iter().all(|p| p[0].is_nan() && p[1].is_nan()));
-        let swung = sent(Lie::Oscillating { amplitude: [0.0, 3.0], periods: 4 });
-        for (k, y) in [1.0, 4.0, 1.0, -2.0, 1.0].into_iter().enumerate() {
-            assert!((swung[k][1] - y).abs() < 1e-12, "{swung:?}");
-        }
         let random = sent(Lie::Random { radius: 0.5 });
         let away = |k: usize| (random[k][0] - (k + 1) as f64).hypot(random[k][1] - 1.0);
         assert!((0..8).all(|k| away(k) <= 0.5) && away(0) != away(1));

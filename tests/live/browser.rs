@@ -7,6 +7,7 @@ use std::process::Command;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::run;
 use flockform::scene::Scene;
+use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::flight::Flight;
 use serde_json::{Value, json};
@@ -149,7 +150,9 @@ fn a_formation_is_designed_and_the_file_is_the_design() {
     assert!(scout.neighbours.contains(&"robot_13".to_owned()), "{:?}", scout.neighbours);
     let led = |entry: &flockform::scene::swarm::raw::RawLeaders| entry.robots.contains(&"scout".to_owned());
     assert!(!swarm.raw.leaders.iter().any(led), "placed to lead, and told to follow");
-    assert_eq!((swarm.raw.robots.len(), swarm.raw.flight.duration), (26, Some(75.0)));
+    let bundled = bundled_swarm("square").expect("bundled").load_swarm(&[]).expect("loads");
+    let durations = [&swarm, &bundled].map(|swarm| swarm.raw.flight.duration);
+    assert_eq!((swarm.raw.robots.len(), durations[0]), (26, durations[1]));
     Flight::new(&swarm).unwrap_or_else(|error| panic!("{error}"));
 }
 

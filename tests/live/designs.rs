@@ -99,7 +99,9 @@ fn what_a_designer_does_is_in_the_file_and_is_undone() {
     let scout = file.raw.robots.iter().find(|robot| robot.name == "scout").expect("written");
     assert_eq!(scout.place, [8.5, 4.0]);
     assert_eq!(file.raw.leaders[0].robots, ["robot_5", "robot_21", "robot_25", "scout"]);
-    assert_eq!(file.raw.flight.duration, Some(75.0), "what has not flown flies as long as its file says");
+    let bundled = bundled_swarm("square").expect("bundled").load_swarm(&[]).expect("loads");
+    let durations = [&file, &bundled].map(|swarm| swarm.raw.flight.duration);
+    assert_eq!(durations[0], durations[1], "what has not flown flies as long as its file says");
     assert!(file.raw.robots.iter().all(|robot| !robot.neighbours.contains(&"robot_1".to_owned())));
 
     for _ in 0..7 {

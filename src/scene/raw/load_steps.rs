@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 pub struct RawLoadSteps {
     /// So many equal parts of the loads and of the leaders' motions, each solved to equilibrium.
     #[serde(default)]
-    #[schemars(range(min = 1))]
+    #[schemars(range(min = 1, max = 1000000))]
     pub increments: Option<usize>,
     /// Parts of the loads and of the leaders' motions, from 0 to 1, in the order in which they are solved to
     /// equilibrium: one lower than that before it unloads [1].

@@ -33,7 +33,7 @@ pub enum RawNeighbours {
     /// The sites at these offsets in columns and rows of the lattice.
     Offsets {
         /// Pairs of whole numbers, in the order of summation.
-        #[schemars(length(min = 1))]
+        #[schemars(length(min = 1), inner(inner(range(min = -1000, max = 1000))))]
         offsets: Vec<[i32; 2]>,
     },
     /// All particles within a radius in the reference configuration.

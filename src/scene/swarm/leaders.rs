@@ -6,6 +6,7 @@ use super::raw::*;
 use super::{Leaders, Picked, Program, Shape};
 use crate::flock::motion::{Interpolation, Keyframe, Motion};
 use crate::scene::document::problem::SceneError;
+use crate::scene::rows::Rows;
 use crate::scene::text;
 use crate::scene::validate::{Refuse, roles};
 
@@ -105,40 +106,31 @@ fn program(
 /// # Errors
 /// A sentence that names the line and what is wrong with it.
 fn track(text: &str, scale: f64) -> Result<Program, String> {
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
-    let header: Vec<String> =
-        reader.headers().map_err(|error| error.to_string())?.iter().map(str::to_owned).collect();
-    let named = match header.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        ["t", "dx", "dy"] => false,
-        ["t", "name", "dx", "dy"] => true,
-        _ => return Err(format!("line 1: the header is `{}`", header.join(","))),
+    let rows = Rows::of(text)?;
+    let header: Vec<&str> = rows.header.iter().map(String::as_str).collect();
+    let (name, [dx, dy]) = match header[..] {
+        ["t", "dx", "dy"] => (None, [1, 2]),
+        ["t", "name", "dx", "dy"] => (Some(1), [2, 3]),
+        _ => return Err(format!("line 1: the header is `{}`", rows.header_line())),
     };
     let mut tracks: Vec<(String, Vec<Keyframe>)> = Vec::new();
-    for (row, record) in reader.records().enumerate() {
-        let line = row + 2;
-        let record = record.map_err(|error| format!("line {line}: {error}"))?;
-        let number = |column: usize| -> Result<f64, String> {
-            let value = record[column].parse::<f64>().ok().filter(|value| value.is_finite());
-            value.ok_or_else(|| {
-                format!("line {line}: `{}` = `{}` is not a finite number", header[column], &record[column])
-            })
-        };
-        let last = header.len() - 1;
-        let frame =
-            Keyframe { step: number(0)?, displacement: [scale * number(last - 1)?, scale * number(last)?] };
-        let name = if named { &record[1] } else { "" };
+    rows.each(|row| {
+        let displacement = [row.number(dx, scale)?, row.number(dy, scale)?];
+        let frame = Keyframe { step: row.number(0, 1.0)?, displacement };
+        let name = name.map_or("", |name| row.text(name));
         let place = tracks.iter().position(|(known, _)| known == name).unwrap_or_else(|| {
             tracks.push((name.to_owned(), Vec::new()));
             tracks.len() - 1
         });
         let frames = &mut tracks[place].1;
         if frames.last().is_some_and(|before| before.step >= frame.step) || frame.step < 0.0 {
-            return Err(format!("line {line}: t = {} is not later than the row before it", frame.step));
+            return Err(format!("line {}: t = {} is not later than the row before it", row.line, frame.step));
         }
         frames.push(frame);
-    }
+        Ok(())
+    })?;
     let motion = |frames| Motion::Keyframes { frames, interpolation: Interpolation::Linear };
-    if named {
+    if name.is_some() {
         return Ok(Program::Individual(
             tracks.into_iter().map(|(name, frames)| (name, motion(frames))).collect(),
         ));
@@ -173,5 +165,6 @@ mod tests {
         assert_eq!(error("t,dx,dy\n1,0,0\n1,0,0\n"), "line 3: t = 1 is not later than the row before it");
         assert_eq!(error("t,dx,dy\n"), "the file has no rows");
         assert_eq!(error("x,y\n"), "line 1: the header is `x,y`");
+        assert_eq!(error("t,dx,dy\n0,0,0\n\n\n1,oops,0"), "line 5: `dx` = `oops` is not a finite number");
     }
 }

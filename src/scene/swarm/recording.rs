@@ -1,9 +1,11 @@
 //! A recorded continuum run: the places of some of its particles at every step, from `probes.csv`.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use super::Recording;
 use crate::scene::document::problem::SceneError;
+use crate::scene::rows::Rows;
 use crate::scene::text;
 use crate::scene::validate::Refuse;
 
@@ -21,42 +23,37 @@ pub fn read(file: &str, folder: Option<&Path>, refuse: Refuse<'_>) -> Result<Rec
 /// # Errors
 /// A sentence that names the line and what is wrong with it.
 fn parse(text: &str) -> Result<Recording, String> {
-    let mut reader = csv::Reader::from_reader(text.as_bytes());
-    let header = reader.headers().map_err(|error| error.to_string())?.clone();
-    let column = |name: &str| {
-        header
-            .iter()
-            .position(|known| known == name)
-            .ok_or_else(|| format!("line 1: there is no column `{name}`"))
-    };
+    let rows = Rows::of(text)?;
+    let column = |name| rows.column(name).ok_or_else(|| format!("line 1: there is no column `{name}`"));
     let (step, id, x, y) = (column("step")?, column("id")?, column("x")?, column("y")?);
     let mut recording = Recording { ids: Vec::new(), places: Vec::new() };
-    for (row, record) in reader.records().enumerate() {
-        let line = row + 2;
-        let record = record.map_err(|error| format!("line {line}: {error}"))?;
-        let wrong = |column: usize| format!("line {line}: `{}` = `{}`", &header[column], &record[column]);
-        let whole = |column: usize| record[column].parse::<usize>().map_err(|_| wrong(column));
-        let coordinate = |column: usize| {
-            record[column].parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| wrong(column))
-        };
-        let (step, id, at) = (whole(step)?, whole(id)?, [coordinate(x)?, coordinate(y)?]);
-        if step == recording.places.len() {
+    let mut known = HashSet::new();
+    rows.each(|row| {
+        let (step, id, at) =
+            (row.whole(step)? as usize, row.id(id)? as usize, [row.number(x, 1.0)?, row.number(y, 1.0)?]);
+        let line = row.line;
+        let begun = recording.places.len();
+        if step == begun {
             recording.places.push(Vec::new());
+        } else if step + 1 != begun {
+            return Err(match begun {
+                0 => format!("line {line}: the first step is {step}, not 0"),
+                _ => format!("line {line}: step {step} does not follow step {}", begun - 1),
+            });
         }
-        if step + 1 != recording.places.len() {
-            return Err(format!(
-                "line {line}: step {step} does not follow step {}",
-                recording.places.len() - 1
-            ));
-        }
-        let number = recording.places[step].len();
-        if step == 0 {
-            recording.ids.push(id);
-        } else if recording.ids.get(number) != Some(&id) {
+        let places = &mut recording.places[step];
+        if step > 0 && recording.ids.get(places.len()) != Some(&id) {
             return Err(format!("line {line}: particle {id} was not in the step before at this place"));
         }
-        recording.places[step].push(at);
-    }
+        if step == 0 {
+            if !known.insert(id) {
+                return Err(format!("line {line}: particle {id} is in this step already"));
+            }
+            recording.ids.push(id);
+        }
+        places.push(at);
+        Ok(())
+    })?;
     let whole = recording.places.iter().all(|places| places.len() == recording.ids.len());
     match recording.ids.len() {
         0 => Err("the file has no rows".into()),
@@ -78,7 +75,14 @@ mod tests {
         let error = |text: &str| parse(text).expect_err("refused");
         assert_eq!(error("step,id,x,y\n0,3,1,2\n2,3,1,2\n"), "line 3: step 2 does not follow step 0");
         assert_eq!(error("step,id,x\n"), "line 1: there is no column `y`");
-        assert_eq!(error("step,id,x,y\n0,1,inf,2\n"), "line 2: `x` = `inf`");
+        assert_eq!(error("step,id,x,y\n0,1,inf,2\n"), "line 2: `x` = `inf` is not a finite number");
+        assert_eq!(error("step,id,x,y\n\n1,1,0,0\n"), "line 3: the first step is 1, not 0");
+        let far = "step,id,x,y\n18446744073709551615,1,0,0\n";
+        assert_eq!(
+            error(far),
+            "line 2: `step` = `18446744073709551615` is not a whole number from 0 to 4294967295"
+        );
+        assert_eq!(error("step,id,x,y\n0,1,0,0\n0,1,0,0\n"), "line 3: particle 1 is in this step already");
         assert_eq!(
             error("step,id,x,y\n0,1,1,2\n1,2,1,2\n"),
             "line 3: particle 2 was not in the step before at this place"

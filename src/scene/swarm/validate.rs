@@ -16,9 +16,6 @@ use crate::scene::raw::{
 use crate::scene::validate::{self as scene_checks, File, Refuse};
 use crate::scene::{Scene, bundled};
 
-/// Periods of a simulated flight: at a hundred a second more than a day.
-const MOST_PERIODS: f64 = 1e7;
-
 impl Swarm {
     /// Reads a swarm file from disk; `overrides` are `KEY.PATH=VALUE` texts applied on top.
     ///
@@ -298,11 +295,6 @@ fn check_flight(raw: &RawSwarm, refuse: Refuse<'_>) -> Result<(), SceneError> {
     if let Some(key) = needs {
         let message = "this model of a robot needs a limit".into();
         return Err(refuse(key, message, "give it, or use flight.model = { kind = \"ideal\" }"));
-    }
-    let periods = raw.flight.duration.unwrap_or(0.0) / raw.control.period;
-    if periods > MOST_PERIODS {
-        let message = format!("is {periods:.3e} periods; a flight has {MOST_PERIODS:e} at most");
-        return Err(refuse("flight.duration", message, "give a shorter time, or a longer control.period"));
     }
     let starts: Vec<&String> = raw.flight.start.iter().map(|start| &start.robot).collect();
     if let Some(n) = repeated(&starts) {

@@ -165,23 +165,25 @@ fn stretches(runs: &[Run], is_filled_up: bool) -> impl Iterator<Item = Vec<Lane<
         Some((before, chunk))
     });
     chunks.filter(|(_, chunk)| chunk[0].is_packed()).map(move |(begin, chunk)| {
-        let of_run = |run: &'_ Run| run.start..run.start + run.len;
-        let mut lanes: Vec<Lane<'_>> =
-            chunk.iter().flat_map(|run| of_run(run).map(move |particle| (particle, run))).collect();
+        let mut lanes: Vec<_> = lanes_of(chunk).collect();
         let missing = lanes.len().next_multiple_of(PACK) - lanes.len();
         let [first, end] = [lanes[0].0, lanes[lanes.len() - 1].0 + 1];
         let after = runs.get(begin + chunk.len()).filter(|run| run.start == end);
         let before = begin.checked_sub(1).map(|at| &runs[at]).filter(|run| run.start + run.len == first);
         let beside = [before, after].map(|run| run.map_or(0, |run| run.len as usize));
         if is_filled_up && missing <= PACK - STRETCH && missing <= beside[0] + beside[1] {
-            let more = after.into_iter().flat_map(|run| of_run(run).map(move |particle| (particle, run)));
-            lanes.extend(more.take(missing));
+            lanes.extend(lanes_of(after).take(missing));
             let missing = missing - missing.min(beside[1]);
-            let more = before.into_iter().flat_map(|run| of_run(run).map(move |particle| (particle, run)));
-            lanes.splice(0..0, more.skip(beside[0] - missing));
+            lanes.splice(0..0, lanes_of(before).skip(beside[0] - missing));
         }
         lanes
     })
+}
+
+/// The particles of some runs.
+fn lanes_of<'a>(runs: impl IntoIterator<Item = &'a Run>) -> impl Iterator<Item = Lane<'a>> {
+    let of_run = |run: &'a Run| (run.start..run.start + run.len).map(move |particle| (particle, run));
+    runs.into_iter().flat_map(of_run)
 }
 
 /// The terms of a pack while it is made.

@@ -41,7 +41,6 @@ impl Fleet {
             jitter: raw.flight.jitter,
             loss: raw.flight.loss,
             duplication: raw.flight.duplicates,
-            ..ChannelParams::default()
         };
         Ok(Self {
             channels: (0..robots.len()).map(|m| Channel::new(params, raw.flight.seed, m)).collect(),

@@ -59,7 +59,7 @@ impl Flight {
         let control = Control::new(swarm)?;
         let flight = Self {
             fleet: Fleet::new(swarm, control.formation())?,
-            periods: periods(swarm, &control),
+            periods: periods(swarm, &control)?,
             continuum: continuum(swarm)?,
             commands: commands::of(swarm, &control)?,
             control,
@@ -175,21 +175,35 @@ pub fn fly_with_observer(
 }
 
 /// As long as the file states; else as many periods as the scene has steps, or until some time after the programs.
-fn periods(swarm: &Swarm, control: &Control) -> u64 {
+///
+/// # Errors
+/// Names what makes it too long.
+fn periods(swarm: &Swarm, control: &Control) -> Result<u64, SceneError> {
     /// \[s\]
     const AFTER_THE_PROGRAMS: f64 = 10.0;
-    if let Some(duration) = swarm.raw.flight.duration {
-        return (duration / control.period()).round().max(1.0) as u64;
-    }
-    match (&swarm.shape, control.formation().steps()) {
-        (_, Some(steps)) => steps as u64,
-        (Shape::Scene(scene) | Shape::Inside(scene), None) => scene.stop.steps as u64,
+    /// At a hundred a second more than a day.
+    const MOST: f64 = 1e7;
+    let (why, periods) = match (swarm.raw.flight.duration, &swarm.shape, control.formation().steps()) {
+        (Some(duration), ..) => ("", (duration / control.period()).round().max(1.0)),
+        (None, _, Some(steps)) => ("as long as the recorded run it ", steps as f64),
+        (None, Shape::Scene(scene) | Shape::Inside(scene), None) => {
+            ("as long as the scene's it ", scene.stop.steps as f64)
+        }
         _ => {
             let end = control.formation().programs_end();
             let end = if end.is_finite() { end } else { 0.0 };
-            ((end + AFTER_THE_PROGRAMS) / control.period()).ceil() as u64
+            ("until the leaders' programs end it ", ((end + AFTER_THE_PROGRAMS) / control.period()).ceil())
         }
+    };
+    if periods > MOST {
+        let message = format!("{why}is {periods:.3e} periods; a flight has {MOST:e} at most");
+        return Err(swarm.refuse(
+            "flight.duration",
+            message,
+            "give a shorter time, or a longer control.period",
+        ));
     }
+    Ok(periods as u64)
 }
 
 /// The run that the flight is compared with.

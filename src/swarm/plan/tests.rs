@@ -132,8 +132,9 @@ fn solved_weights_follow_every_affine_motion_and_equal_ones_shifts_alone() {
         slow.iter().map(|&one| one.to_owned()).chain(["control.sweeps=20000".into()]).collect();
     let swarm = bundled_swarm("square").expect("bundled").load_swarm(&slow).expect("loads");
     let mut flight = Flight::new(&swarm).expect("laid out");
+    let end = swarm.raw.flight.duration.expect("a duration");
     let mut flown: f64 = 0.0;
-    while flight.fleet().time() < 60.0 {
+    while flight.fleet().time() < end {
         flight.step();
         let affine = flight.control().formation().affine(flight.fleet().time()).expect("a manoeuvre");
         let formation = flight.control().formation();

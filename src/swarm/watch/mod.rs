@@ -103,11 +103,6 @@ impl Watch {
         &self.limits
     }
 
-    /// Takes effect from the next pose or look on; what is believed stays so.
-    pub fn set_limits(&mut self, limits: WatchLimits) {
-        self.limits = limits;
-    }
-
     /// Takes in a pose of `member` that arrives at `now` \[s\]. A rejected pose changes nothing but its
     /// count and, where it jumps or follows a stop, the run that makes the next ones believed.
     ///

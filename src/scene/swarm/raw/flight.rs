@@ -27,7 +27,7 @@ pub struct RawFlight {
     #[serde(default)]
     #[schemars(range(max = 1000))]
     pub delay: u32,
-    /// Most that is added to the delay at random; poses may overtake each other [period].
+    /// Most that is added to the delay at random [period]. Poses keep their order: one that takes long holds back those behind it.
     #[serde(default)]
     #[schemars(range(max = 1000))]
     pub jitter: u32,
