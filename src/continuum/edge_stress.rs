@@ -170,7 +170,9 @@ pub(super) fn recovered(
     (displacement, rotation): (&Vectors, Rotation),
 ) -> Vec<(usize, StressState)> {
     let (Some(edge), Some(cells)) = (engine.free_edge(), engine.cells()) else { return Vec::new() };
-    let (patches, factor) = (Patches::new(edge, engine.body(), cells), engine.load_factor());
+    let patches = Patches::new(edge, engine.body(), cells);
+    // A body that has not moved yet bears nothing.
+    let factor = if engine.has_moved() { engine.load_factor() } else { 0.0 };
     let turns: Option<Vec<f64>> = (rotation == Rotation::Corotated)
         .then(|| stress::turns(cells, 0..cells.count(), displacement).collect());
     let turn = |cell: u32| turns.as_ref().map_or(0.0, |turns| turns[cell as usize]);

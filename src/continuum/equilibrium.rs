@@ -15,7 +15,6 @@ use crate::engine::shared::Agreed;
 use crate::engine::state::EngineState;
 use crate::flock::role::Role;
 use crate::flock::vectors::{Vectors, distance};
-use crate::material::elastic::{Constants, Plane};
 use crate::ranks::Team;
 use crate::scene::{LoadSteps, Scene, SceneError};
 use crate::solve::corotated::{self, CorotatedError, Way};
@@ -235,10 +234,8 @@ const NEAR_A_HALF: f64 = 0.49;
 /// Whether the body's material, or that of one of its inclusions, hardly changes its volume.
 fn is_nearly_incompressible(scene: &Scene) -> bool {
     let inclusions = scene.inclusions.iter().map(|part| &part.material);
-    scene.material.iter().chain(inclusions).any(|part| match part.constants() {
-        Constants::Isotropic { poisson, plane: Plane::Strain, .. } => poisson > NEAR_A_HALF,
-        _ => false,
-    })
+    let mut all = scene.material.iter().chain(inclusions);
+    all.any(|part| part.poisson_in_plane_strain().is_some_and(|poisson| poisson > NEAR_A_HALF))
 }
 
 fn refuse_corotated(scene: &Scene, error: &CorotatedError) -> SceneError {

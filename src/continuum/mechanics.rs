@@ -75,14 +75,10 @@ pub struct Stresses {
 }
 
 impl Stresses {
-    /// Under these displacements \[length\], these pairs of particles being parted; `None` without cells.
-    pub fn of(
-        engine: &Engine,
-        elastic: &Elastic,
-        displacement: &Vectors,
-        broken: &[[u32; 2]],
-    ) -> Option<Self> {
-        let cells = engine.cells()?;
+    /// At a step that has been taken, under these displacements \[length\], these pairs of particles being parted; `None`
+    /// without a material.
+    pub fn of(engine: &Engine, step: usize, displacement: &Vectors, broken: &[[u32; 2]]) -> Option<Self> {
+        let (cells, elastic) = (engine.cells()?, engine.elastic_at(step)?);
         let torn = torn(cells, displacement.len(), broken);
         let of_cells = of_whole_cells(engine, (cells, &torn), elastic, displacement);
         let mut particles =
@@ -98,25 +94,25 @@ impl Stresses {
         Some(Self { cells: of_cells, particles, recovered })
     }
 
-    /// Those of the cells alone, under the same; empty without cells.
+    /// Those of the cells alone, under the same; empty without a material.
     pub fn in_cells(
         engine: &Engine,
-        elastic: &Elastic,
+        step: usize,
         displacement: &Vectors,
         broken: &[[u32; 2]],
     ) -> Vec<StressState> {
-        let of = |cells| {
-            let torn = torn(cells, displacement.len(), broken);
-            of_whole_cells(engine, (cells, &torn), elastic, displacement)
+        let (Some(cells), Some(elastic)) = (engine.cells(), engine.elastic_at(step)) else {
+            return Vec::new();
         };
-        engine.cells().map_or_else(Vec::new, of)
+        let torn = torn(cells, displacement.len(), broken);
+        of_whole_cells(engine, (cells, &torn), elastic, displacement)
     }
 
     /// At the engine's present places.
-    pub fn at_present(engine: &Engine, elastic: &Elastic) -> Option<Self> {
+    pub fn at_present(engine: &Engine) -> Option<Self> {
         let here = |index: u32| Some(engine.body().exact_particle(index as usize)? as u32);
         let pairs = engine.breaks().iter().filter_map(|one| Some([here(one.pair[0])?, here(one.pair[1])?]));
-        Self::of(engine, elastic, &engine.displacements(), &pairs.collect::<Vec<_>>())
+        Self::of(engine, engine.step(), &engine.displacements(), &pairs.collect::<Vec<_>>())
     }
 
     /// Of the whole body, if each part knows its own.
@@ -198,13 +194,13 @@ fn of_whole_cells(
 
 impl Mechanics {
     /// At the engine's present places; `None` without a material.
-    pub fn of(engine: &Engine, elastic: &Elastic) -> Option<Self> {
-        Self::under(&Stresses::at_present(engine, elastic)?, engine, elastic)
+    pub fn of(engine: &Engine) -> Option<Self> {
+        Self::under(&Stresses::at_present(engine)?, engine)
     }
 
     /// Where the stresses at the engine's present places are known already.
-    pub fn under(stresses: &Stresses, engine: &Engine, elastic: &Elastic) -> Option<Self> {
-        let cells = engine.cells()?;
+    pub fn under(stresses: &Stresses, engine: &Engine) -> Option<Self> {
+        let (cells, elastic) = (engine.cells()?, engine.elastic()?);
         let forces = Forces::of(engine);
         let u = engine.displacements();
         let own = engine.owned_cells();

@@ -174,6 +174,7 @@ impl Plan {
             changes,
             actions,
             cells,
+            elastic: scene.material,
             loads,
             free_edge,
             present_radius: match scene.neighbourhood {
@@ -244,7 +245,7 @@ impl Following {
     fn conduct(self, scene: &Scene, layout: &Layout) -> Conduct {
         let Self { weights, forces, update, loads, free_edge } = self;
         let flock = flock(scene, &layout.body, layout.neighbours.clone(), weights, forces);
-        Conduct::new(flock, update, layout.cells.clone(), loads, free_edge)
+        Conduct::new(flock, update, (layout.cells.clone(), scene.material), loads, free_edge)
     }
 }
 

@@ -9,7 +9,6 @@ pub use crate::engine::probes::ProbeSeries;
 use crate::engine::serde_impls;
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
-use crate::material::elastic::Elastic;
 
 /// A whole configuration at one step; arrays of shape \[count\].
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -57,9 +56,9 @@ pub struct LoadStep {
 }
 
 impl LoadStep {
-    /// `None` without cells.
-    pub fn of(engine: &Engine, elastic: &Elastic) -> Option<Self> {
-        let mechanics = Mechanics::of(engine, elastic)?;
+    /// `None` without a material.
+    pub fn of(engine: &Engine) -> Option<Self> {
+        let mechanics = Mechanics::of(engine)?;
         Some(Self { step: engine.step(), factor: engine.load_factor(), mechanics })
     }
 }

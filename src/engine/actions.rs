@@ -8,33 +8,34 @@ use std::sync::Arc;
 use super::Engine;
 use super::load::Load;
 use super::setup::{Conduct, RoleChange, Setup};
-use crate::flock::action::{Action, ActionKind};
+use crate::flock::action::ActionKind;
 use crate::flock::fracture::Bonds;
 use crate::flock::law::Flock;
 use crate::flock::motion::Motion;
 use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
+use crate::material::elastic::Elastic;
 use crate::material::free_edge::FreeEdge;
 use crate::sweep::Update;
 
 impl Conduct {
     /// That of a body before its first step.
     pub fn of(setup: Setup) -> Self {
-        let Setup { flock, update, cells, loads, free_edge, .. } = setup;
-        Self::new(flock, update, cells, loads, free_edge)
+        let Setup { flock, update, cells, elastic, loads, free_edge, .. } = setup;
+        Self::new(flock, update, (cells, elastic), loads, free_edge)
     }
 
     /// That of particles that follow as `flock` does, and what acts on them.
     pub fn new(
         flock: Flock,
         update: Update,
-        cells: Option<Cells>,
+        (cells, elastic): (Option<Cells>, Option<Elastic>),
         loads: Vec<Vectors>,
         free_edge: Option<Arc<FreeEdge>>,
     ) -> Self {
         let Flock { rule, weights, forces, rest, keeps_rest, bonds, .. } = flock;
         let fracture = bonds.map(|bonds| (bonds.threshold, bonds.ghosts));
-        Self { rule, weights, forces, rest, keeps_rest, fracture, update, cells, loads, free_edge }
+        Self { rule, weights, forces, rest, keeps_rest, fracture, update, cells, elastic, loads, free_edge }
     }
 }
 
@@ -74,8 +75,19 @@ impl Engine {
     }
 
     fn conduct(&mut self, conduct: &Conduct) {
-        let Conduct { rule, weights, forces, rest, keeps_rest, fracture, update, cells, loads, free_edge } =
-            conduct.clone();
+        let Conduct {
+            rule,
+            weights,
+            forces,
+            rest,
+            keeps_rest,
+            fracture,
+            update,
+            cells,
+            elastic,
+            loads,
+            free_edge,
+        } = conduct.clone();
         let flock = &mut self.flock;
         (flock.rule, flock.weights, flock.forces) = (rule, weights, forces);
         (flock.rest, flock.keeps_rest) = (rest, keeps_rest);
@@ -88,7 +100,7 @@ impl Engine {
             }
             (None, None) => {}
         }
-        (self.update, self.cells, self.free_edge) = (update, cells, free_edge);
+        (self.update, self.cells, self.elastic, self.free_edge) = (update, cells, elastic, free_edge);
         let factor = self.load_factor();
         self.load = Load::new(self.load.ramp(), loads);
         self.set_load_factor(factor);
@@ -96,15 +108,26 @@ impl Engine {
         self.compile_sweep();
     }
 
+    /// How the particles follow at a step by the plan, where an action has changed that by then.
+    fn planned_conduct(&self, step: usize) -> Option<&Arc<Conduct>> {
+        self.actions.iter().rev().filter(|action| action.at <= step).find_map(|action| match &action.what {
+            ActionKind::Follow(conduct) => Some(conduct),
+            ActionKind::Cut(_) => None,
+        })
+    }
+
     /// Follows by what the plan has for this step: part of putting a state back.
     pub(super) fn conduct_until_now(&mut self) {
-        let last =
-            |action: &&Action<_>| action.at <= self.step && matches!(action.what, ActionKind::Follow(_));
-        if let Some(Action { what: ActionKind::Follow(conduct), .. }) =
-            self.actions.iter().rfind(last).cloned()
-        {
+        if let Some(conduct) = self.planned_conduct(self.step).cloned() {
             self.conduct(&conduct);
         }
+    }
+
+    /// The material at a step that has been taken.
+    pub(crate) fn elastic_at(&self, step: usize) -> Option<&Elastic> {
+        let planned = self.planned_conduct(step).map(|conduct| &conduct.elastic);
+        let is_now = step == self.step || self.planned_conduct(self.step).is_none();
+        if is_now { &self.elastic } else { planned.unwrap_or(&self.first_elastic) }.as_ref()
     }
 
     /// Adds a role that particles take at a step to come, and returns its number among the changes.

@@ -35,6 +35,7 @@ use crate::flock::rules::Rule;
 use crate::flock::strain::{Strain, strain};
 use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
+use crate::material::elastic::Elastic;
 use crate::material::free_edge::{Edge, FreeEdge};
 use crate::ranks::Team;
 use crate::sweep::domain::Share;
@@ -77,6 +78,9 @@ pub struct Engine {
     step: usize,
     /// Between the particles, where the scene has a material.
     cells: Option<Cells>,
+    /// The material, inclusions left aside: before the first step, and now.
+    first_elastic: Option<Elastic>,
+    elastic: Option<Elastic>,
     free_edge: Option<Arc<FreeEdge>>,
     load: Load,
     /// Displacements of a body that was put to rest \[length\]; positions have lost their last digits.
@@ -100,6 +104,11 @@ struct PresentNeighbours {
 }
 
 impl Engine {
+    /// Whether it has been stepped or put to rest.
+    pub(crate) fn has_moved(&self) -> bool {
+        self.step > 0 || self.settled.is_some()
+    }
+
     /// The body before its first step, with the roles and the part of the loads that hold from the start.
     pub fn new(setup: Setup) -> Self {
         let Setup {
@@ -112,6 +121,7 @@ impl Engine {
             cuts,
             actions,
             cells,
+            elastic,
             loads,
             ramp,
             free_edge,
@@ -142,6 +152,8 @@ impl Engine {
             activity: Activity::default(),
             step: 0,
             cells,
+            first_elastic: elastic,
+            elastic,
             free_edge,
             load: Load::new(ramp, loads),
             settled: None,
@@ -204,6 +216,11 @@ impl Engine {
     /// Cells between the particles, where the scene has a material.
     pub fn cells(&self) -> Option<&Cells> {
         self.cells.as_ref()
+    }
+
+    /// The material as it is now, inclusions left aside.
+    pub fn elastic(&self) -> Option<&Elastic> {
+        self.elastic.as_ref()
     }
 
     /// The order and the damping of the sweep.

@@ -13,6 +13,7 @@ use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Rule};
 use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
+use crate::material::elastic::Elastic;
 use crate::material::free_edge::FreeEdge;
 use crate::sweep::Update;
 
@@ -37,6 +38,8 @@ pub struct Setup {
     pub actions: Vec<Action<Arc<Conduct>>>,
     /// Between the particles, where the body has a material.
     pub cells: Option<Cells>,
+    /// The material, inclusions left aside.
+    pub elastic: Option<Elastic>,
     /// Forces of each load on the particles \[force\], shape \[loads\]\[count\]; their sum is the flock's.
     pub loads: Vec<Vectors>,
     /// Steps over which the loads grow; they act from the first one on where there is no ramp.
@@ -109,6 +112,8 @@ pub struct Conduct {
     pub update: Update,
     /// Between the particles, where the body has a material.
     pub cells: Option<Cells>,
+    /// The material, inclusions left aside.
+    pub elastic: Option<Elastic>,
     /// Forces of each load on the particles \[force\], shape \[loads\]\[count\].
     pub loads: Vec<Vectors>,
     /// Of a body fitted to its outline whose rule is a material.
@@ -128,6 +133,7 @@ impl Setup {
             cuts: Vec::new(),
             actions: Vec::new(),
             cells: None,
+            elastic: None,
             loads: Vec::new(),
             ramp: None,
             free_edge: None,

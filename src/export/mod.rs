@@ -259,7 +259,7 @@ fn figures_of<'a>(results: &'a Results<'_>, subject: &'a Subject<'_>, units: &'a
         let name = |what: &str| format!("{what}_{:04}", snapshot.step);
         figures.push((name("configuration"), Box::new(move || figures::configuration(subject, snapshot))));
         figures.push((name("pe1"), Box::new(move || figures::pe1(subject, snapshot))));
-        if let (Some(cells), Some(elastic)) = (outcome.engine.cells(), &scene.material) {
+        if let Some(cells) = outcome.engine.cells() {
             // Each figure has stresses of its own while it is drawn, and none before or after.
             let displacement = move || -> Vectors {
                 let moved = |(now, then): ([f64; 2], [f64; 2])| [now[0] - then[0], now[1] - then[1]];
@@ -267,13 +267,13 @@ fn figures_of<'a>(results: &'a Results<'_>, subject: &'a Subject<'_>, units: &'a
             };
             let unit = units.stress.as_str();
             let von_mises = move || {
-                let found = Stresses::of(&outcome.engine, elastic, &displacement(), &snapshot.broken);
+                let found = Stresses::of(&outcome.engine, snapshot.step, &displacement(), &snapshot.broken);
                 let none = || Stresses { cells: Vec::new(), particles: Vec::new(), recovered: Vec::new() };
                 figures::stress(subject, snapshot, cells, &found.unwrap_or_else(none), unit)
             };
             let components = move || {
                 let stresses =
-                    Stresses::in_cells(&outcome.engine, elastic, &displacement(), &snapshot.broken);
+                    Stresses::in_cells(&outcome.engine, snapshot.step, &displacement(), &snapshot.broken);
                 figures::components(subject, snapshot, (cells, scene.rotation()), &stresses, unit)
             };
             figures.push((name("von_mises"), Box::new(von_mises)));

@@ -266,9 +266,8 @@ impl Measured {
     /// At the places where a run ended, and the stresses there; `None` without a material.
     pub fn of(scene: &Scene, outcome: &Outcome) -> Option<(Self, Stresses)> {
         let engine = &outcome.engine;
-        let elastic = scene.material.as_ref()?;
-        let stresses = Stresses::at_present(engine, elastic)?;
-        let mechanics = Mechanics::under(&stresses, engine, elastic)?;
+        let stresses = Stresses::at_present(engine)?;
+        let mechanics = Mechanics::under(&stresses, engine)?;
         let places = at_places(scene, engine, &stresses);
         let is_settled = outcome.solved.as_ref().is_some_and(Solved::is_at_rest);
         let is_corotated = scene.rotation() == Rotation::Corotated;

@@ -42,7 +42,6 @@ use crate::flock::role::Role;
 use crate::flock::strain::Strain;
 use crate::flock::vectors::{Vectors, distance};
 use crate::material::cells::Cells;
-use crate::material::elastic::Elastic;
 use crate::material::stress::StressState;
 use crate::ranks::Team;
 
@@ -63,7 +62,6 @@ pub struct VtkSeries {
     frames: Vec<(usize, Option<usize>)>,
     /// Number of them that are known to be on the disk.
     synced: usize,
-    material: Option<Elastic>,
 }
 
 impl VtkSeries {
@@ -71,12 +69,7 @@ impl VtkSeries {
     pub fn create(folder: &OutputFolder) -> Result<Self, ExportError> {
         let steps = folder.path(FOLDER);
         fs::create_dir_all(&steps).map_err(ExportError::io("create", &steps))?;
-        Ok(Self { files: folder.files(), frames: Vec::new(), synced: 0, material: None })
-    }
-
-    /// Adds the stress in a body of this material.
-    pub fn with_material(self, material: Option<Elastic>) -> Self {
-        Self { material, ..self }
+        Ok(Self { files: folder.files(), frames: Vec::new(), synced: 0 })
     }
 
     /// Goes on after the frames of these `steps`, which an earlier run has written below `from`.
@@ -131,7 +124,7 @@ impl VtkSeries {
             return self.write_pieces(engine, team);
         }
         let path = self.files.path(&Path::new(FOLDER).join(file_name(engine.step())));
-        let values = Values::of(engine, self.material.as_ref());
+        let values = Values::of(engine);
         write_frame(&path, &values).map_err(ExportError::io("write", &path))?;
         self.frames.push((engine.step(), None));
         Ok(())
@@ -140,9 +133,8 @@ impl VtkSeries {
     fn write_pieces(&mut self, engine: &Engine, team: &Team) -> Result<(), ExportError> {
         let frame = (engine.step(), Some(team.count()));
         let list = &self.paths(&[frame])[0];
-        let material = self.material.as_ref();
-        write_own_piece((list.parent(), team), engine, material)?;
-        let has_stresses = material.is_some() && engine.cells().is_some();
+        write_own_piece((list.parent(), team), engine)?;
+        let has_stresses = engine.elastic().is_some() && engine.cells().is_some();
         write_file(list, list_of_pieces(engine.step(), team.count(), has_stresses))?;
         self.frames.push(frame);
         Ok(())
@@ -185,22 +177,18 @@ fn piece_name(step: usize, rank: usize) -> String {
     format!("step_{step:06}_{rank:04}.vtu")
 }
 
-/// Writes this rank's piece of a frame, with the stress in a body of this material, into the folder of the first rank, which has
+/// Writes this rank's piece of a frame, with the stress in a body that has a material, into the folder of the first rank, which has
 /// to be there for all of them; to be called by all ranks but the first while that one [writes](VtkSeries::write) the frame.
 ///
 /// # Errors
 /// A piece that cannot be written, by any rank.
-pub fn write_piece(engine: &Engine, team: &Team, material: Option<&Elastic>) -> Result<(), ExportError> {
-    write_own_piece((None, team), engine, material)
+pub fn write_piece(engine: &Engine, team: &Team) -> Result<(), ExportError> {
+    write_own_piece((None, team), engine)
 }
 
-fn write_own_piece(
-    (folder, team): (Option<&Path>, &Team),
-    engine: &Engine,
-    material: Option<&Elastic>,
-) -> Result<(), ExportError> {
+fn write_own_piece((folder, team): (Option<&Path>, &Team), engine: &Engine) -> Result<(), ExportError> {
     let name = |rank: usize| piece_name(engine.step(), rank);
-    let values = Values::of(engine, material);
+    let values = Values::of(engine);
     let write = |path: &Path| write_frame(path, &values).map_err(ExportError::io("write", path));
     write_each(folder, name, team, write)
 }
@@ -282,9 +270,8 @@ struct Others {
 
 impl<'a> Values<'a> {
     /// At the engine's present places; of a body in parts found by all ranks together.
-    fn of(engine: &'a Engine, material: Option<&Elastic>) -> Self {
-        let stresses = material.and_then(|elastic| Stresses::at_present(engine, elastic));
-        let own = Self { engine, stresses, others: Others::default() };
+    fn of(engine: &'a Engine) -> Self {
+        let own = Self { engine, stresses: Stresses::at_present(engine), others: Others::default() };
         let others = Others {
             energies: engine.of_others(|i| own.energies(i)),
             strains: engine.of_others(|i| own.strain(i)),

@@ -49,7 +49,8 @@ pub enum Constants {
     },
 }
 
-/// Poisson's ratio in plane strain above which dilatations are averaged: see [`Elastic::averaged_dilatation`].
+/// Poisson's ratio in plane strain above which dilatations are averaged: see [`Elastic::averaged_dilatation`]. In plane stress
+/// 2/3 is as much: Lame's lambda over the shear modulus is the same.
 const LOCKS_ABOVE: f64 = 0.4;
 
 /// Why constants make no stable material.
@@ -151,13 +152,17 @@ impl Elastic {
     /// polygons alike (J. Bonet and A. J. Burton, *A simple average nodal pressure tetrahedral element for incompressible
     /// and nearly incompressible dynamic explicit applications*, Comm. Numer. Meth. Eng. 14, 1998; the patches of E. A. de
     /// Souza Neto, F. M. Andrade Pires and D. R. J. Owen, IJNME 62, 2005, are groups of cells instead). It takes neighbours
-    /// two cells away, so it is used above nu = 0.4 alone, in plane strain.
+    /// two cells away, so it is used above nu = 0.4 alone in plane strain, and above 2/3 in plane stress.
     pub fn averaged_dilatation(&self) -> Option<f64> {
+        (self.poisson_in_plane_strain()? > LOCKS_ABOVE).then(|| self.stiffness[(0, 1)])
+    }
+
+    /// Poisson's ratio of the isotropic material that behaves so in plane strain \[1\]; `None` of an orthotropic one.
+    pub fn poisson_in_plane_strain(&self) -> Option<f64> {
         match self.constants {
-            Constants::Isotropic { poisson, plane: Plane::Strain, .. } if poisson > LOCKS_ABOVE => {
-                Some(self.stiffness[(0, 1)])
-            }
-            _ => None,
+            Constants::Isotropic { poisson, plane: Plane::Strain, .. } => Some(poisson),
+            Constants::Isotropic { poisson, plane: Plane::Stress, .. } => Some(poisson / (1.0 + poisson)),
+            Constants::Orthotropic { .. } => None,
         }
     }
 

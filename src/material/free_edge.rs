@@ -54,8 +54,8 @@ impl FreeEdge {
         Self { outline, sides, loads, thickness, held, edge: OnceLock::new() }
     }
 
-    /// Tractions of the loads, and none elsewhere, in the middle of each side of the boundary, along those components that
-    /// are not held at both its ends. `None` where they are not known or too many.
+    /// Tractions of the loads, and none elsewhere, in the middle of each side of the boundary at whose ends no particle is
+    /// pushed by a force of its own, along those components that are not held at both. `None` where they are not known or too many.
     pub fn of(&self, body: &Body, cells: &Cells) -> Option<&Edge> {
         self.edge.get_or_init(|| self.found(body, cells)).as_ref()
     }
@@ -82,12 +82,22 @@ impl FreeEdge {
             Load::Particles { .. } | Load::Body(_) => None,
         };
         let loads: Vec<OutlineLoad> = self.loads.iter().filter_map(outlined).collect();
+        // What a single particle is pushed by acts on its sides in a way that is not known.
+        let mut is_pushed = vec![false; body.count()];
+        for load in &self.loads {
+            if let Load::Particles { particles, force } = load
+                && *force != [0.0; 2]
+            {
+                particles.iter().for_each(|&i| is_pushed[i as usize] = true);
+            }
+        }
         let mut edge = Edge { body_force: self.body_force(), ..Edge::default() };
         let finder = Finder::new(outline);
         let exact = body.exact();
         // Where a part ends is no outline.
         let is_of_body = |side: &[u32; 2]| side.iter().any(|&i| exact.contains(&(i as usize)));
-        for [a, b] in sides.into_iter().filter(is_of_body) {
+        let is_known = |side: &[u32; 2]| !side.iter().any(|&i| is_pushed[i as usize]);
+        for [a, b] in sides.into_iter().filter(|side| is_of_body(side) && is_known(side)) {
             let [from, to] = [a, b].map(|i| body.reference.get(i as usize));
             let (place, _) = finder.nearest([0, 1].map(|k| 0.5 * (from[k] + to[k])));
             let piece = outline.piece(place.ring, place.piece);

@@ -20,7 +20,6 @@ use crate::continuum::run::{Divergence, Outcome, StopReason, overflow};
 use crate::engine::Engine;
 use crate::engine::forces::Forces;
 use crate::flock::role::Role;
-use crate::material::elastic::Elastic;
 use crate::scene::{Scene, SceneError};
 use crate::solve::equilibrium::Request;
 use crate::solve::interrupt::Interrupt;
@@ -103,8 +102,8 @@ impl Body {
         )))
     }
 
-    fn elastic(&self) -> Result<&Elastic, SceneError> {
-        self.scene.material.as_ref().ok_or_else(|| {
+    fn require_material(&self) -> Result<(), SceneError> {
+        self.scene.material.map(|_| ()).ok_or_else(|| {
             let help = "add [material] with kind = \"isotropic\", young and poisson";
             self.scene.refuse("material", "stress is that of a material, and the scene has none", help)
         })
@@ -314,8 +313,8 @@ impl Body {
     /// cells (cells, 3) with xx, yy, xy at their centres, cell_places (cells, 2) [length], cell_von_mises (cells,);
     /// particles (count, 3), particle_von_mises (count,). NaN across a broken bond, and for a particle in no cell.
     fn stress<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let elastic = self.elastic()?;
-        let found = here(py, || Stresses::at_present(&self.engine, elastic))?;
+        self.require_material()?;
+        let found = here(py, || Stresses::at_present(&self.engine))?;
         let (Some(stresses), Some(cells)) = (found, self.engine.cells()) else {
             return Err(self.without_stiffness().into());
         };
@@ -341,8 +340,8 @@ impl Body {
 
     /// Reactions, loads, strain energy, work and the largest stress, with the keys of `summary.json`.
     fn mechanics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let elastic = self.elastic()?;
-        let found = here(py, || Mechanics::of(&self.engine, elastic))?;
+        self.require_material()?;
+        let found = here(py, || Mechanics::of(&self.engine))?;
         as_dict(py, &found.ok_or_else(|| self.without_stiffness())?)
     }
 

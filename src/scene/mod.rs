@@ -250,7 +250,7 @@ pub struct RoleEntry {
 pub enum SceneRegion {
     /// A region that names all of its own bounds.
     Known(Region),
-    /// The outermost particles on a side, half a spacing deep.
+    /// The outermost particles on a side, as deep as the body has them.
     Outermost(Side),
     /// A part of the outline of the shape, and the particles on it.
     Outline(Selection),

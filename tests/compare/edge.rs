@@ -23,9 +23,8 @@ fn measured(text: &str, overrides: &[&str]) -> (Vec<[f64; 3]>, Vec<String>) {
     let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
     let outcome = run_to_equilibrium(&scene, plan, &mut |_, _| ControlFlow::Continue(()));
     let engine = outcome.unwrap_or_else(|error| panic!("{error}")).engine;
-    let elastic = scene.material.expect("a material");
-    let stresses = Stresses::at_present(&engine, &elastic).expect("cells");
-    let mechanics = Mechanics::under(&stresses, &engine, &elastic).expect("cells");
+    let stresses = Stresses::at_present(&engine).expect("cells");
+    let mechanics = Mechanics::under(&stresses, &engine).expect("cells");
     let stress = at_places(&scene, &engine, &stresses).iter().map(|at| at.stress).collect();
     (stress, mechanics.cautions(&engine))
 }

@@ -309,7 +309,7 @@ fn a_frame_holds_every_particle_and_every_bond_with_its_state() {
 fn last_frame(run: &Run, parent: &Path) -> String {
     let engine = &run.outcome.engine;
     let folder = OutputFolder::create(&parent.join("out"), false).expect("created");
-    let mut series = VtkSeries::create(&folder).expect("created").with_material(run.scene.material);
+    let mut series = VtkSeries::create(&folder).expect("created");
     series.write(engine).expect("written");
     let files = series.finish().expect("finished");
     fs::read_to_string(&files[1]).expect("readable")

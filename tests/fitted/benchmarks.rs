@@ -84,8 +84,7 @@ fn the_crown_of_a_hole_carries_its_published_stress() {
             for orientation in [0.0, 20.0] {
                 let scene = load("plate-hole", &[&lattice(kind, h, orientation)]);
                 let (plan, outcome) = solved(&scene);
-                let elastic = scene.material.as_ref().expect("a material");
-                let stresses = Stresses::at_present(&outcome.engine, elastic).expect("a material");
+                let stresses = Stresses::at_present(&outcome.engine).expect("a material");
                 let crown = [0.0, 4.0];
                 let at =
                     (0..plan.count()).find(|&i| distance(plan.setup.body.reference.get(i), crown) < 1e-9);
@@ -104,8 +103,7 @@ fn the_largest_stress_of_a_plate_with_a_hole_does_not_grow_with_refinement() {
             let largest = [1.0, 0.5, 0.25, 0.125].map(|h| {
                 let scene = load("plate-hole", &[&lattice(kind, h, orientation)]);
                 let (_, outcome) = solved(&scene);
-                let elastic = scene.material.as_ref().expect("a material");
-                let peak = Mechanics::of(&outcome.engine, elastic).and_then(|all| all.largest_von_mises);
+                let peak = Mechanics::of(&outcome.engine).and_then(|all| all.largest_von_mises);
                 let peak = peak.expect("is stressed");
                 assert!(distance(peak.place, [0.0, 4.0]) < 1.0, "{kind}, {h}, {orientation}: {peak:?}");
                 peak.von_mises / 3.36

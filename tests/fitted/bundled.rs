@@ -33,8 +33,7 @@ impl Run {
     }
 
     fn mechanics(&self) -> Mechanics {
-        Mechanics::of(&self.outcome.engine, self.scene.material.as_ref().expect("a material"))
-            .expect("has cells")
+        Mechanics::of(&self.outcome.engine).expect("has cells")
     }
 }
 
@@ -71,8 +70,7 @@ fn the_rubber_block_pushes_back_as_its_notes_say() {
 #[test]
 fn the_inclusion_carries_the_stress_that_its_notes_say() {
     let run = Run::of("inclusion", &[]);
-    let elastic = run.scene.material.as_ref().expect("a material");
-    let stresses = Stresses::at_present(&run.outcome.engine, elastic).expect("has cells");
+    let stresses = Stresses::at_present(&run.outcome.engine).expect("has cells");
     let found = stresses.particles[run.particle([1.5, 1.5])].expect("in cells").components;
     for figure in ["1.370", "0.019"] {
         run.quotes(figure);

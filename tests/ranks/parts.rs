@@ -162,12 +162,11 @@ fn measured(scene: &Scene, outcome: &Outcome) -> (String, Vec<[u64; 3]>) {
         format!("{solver} {why} {iterations} {converged} {known_to:?} {residuals:?}")
     };
     let how = outcome.solved.as_ref().map_or_else(String::new, how);
-    let Some(elastic) = &scene.material else { return (how, Vec::new()) };
-    let stresses = Stresses::at_present(engine, elastic).expect("there are cells");
+    let Some(stresses) = Stresses::at_present(engine) else { return (how, Vec::new()) };
     let own = engine.body().owned_in_order().into_iter().map(|i| stresses.particles[i]);
     let of =
         |stress: Option<StressState>| stress.map_or([1; 3], |stress| stress.components.map(f64::to_bits));
-    let readings = Mechanics::under(&stresses, engine, elastic).expect("there are cells");
+    let readings = Mechanics::under(&stresses, engine).expect("there are cells");
     let places = at_places(scene, engine, &stresses);
     let cautions = readings.cautions(engine);
     (format!("{readings:#?} {places:#?} {cautions:?} {how}"), own.map(of).collect())

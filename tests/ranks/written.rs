@@ -48,8 +48,9 @@ impl Writer<'_> {
     }
 
     fn measure(&mut self, engine: &Engine) {
-        let elastic = self.scene.material.as_ref().filter(|_| self.scene.load_steps.is_some());
-        self.rows.extend(elastic.and_then(|elastic| LoadStep::of(engine, elastic)));
+        if self.scene.load_steps.is_some() {
+            self.rows.extend(LoadStep::of(engine));
+        }
     }
 
     fn leave(&self, engine: &Engine, residual: f64) {
@@ -77,7 +78,7 @@ impl Observer for Writer<'_> {
         match (&mut self.frames, self.team) {
             (Some(frames), _) => frames.write(engine).expect("written"),
             (None, Some(team)) if self.scene.record.vtk_every > 0 => {
-                write_piece(engine, team, self.scene.material.as_ref()).expect("written");
+                write_piece(engine, team).expect("written");
             }
             _ => {}
         }
@@ -104,8 +105,7 @@ fn write(scene: &Scene, team: Option<&Team>, out: &Path, from: Option<&Path>, le
     let is_writing = team.is_none_or(Team::is_first);
     let folder = is_writing.then(|| OutputFolder::create(out, true).expect("created"));
     let frames = folder.as_ref().filter(|_| scene.record.vtk_every > 0);
-    let frames =
-        frames.map(|folder| VtkSeries::create(folder).expect("created").with_material(scene.material));
+    let frames = frames.map(|folder| VtkSeries::create(folder).expect("created"));
     let folder_of = folder.as_ref();
     let mut writer = Writer { scene, team, digest, folder: folder_of, frames, rows, leave_at };
     let outcome = run_to_equilibrium_shared(scene, plan, from, team, &mut writer).expect("can be shared");

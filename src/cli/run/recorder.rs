@@ -65,7 +65,7 @@ impl<'a> Recorder<'a> {
             None => VtkSeries::create(folder),
             Some(left) => left.frames(folder, every),
         });
-        let frames = frames.transpose()?.map(|frames| frames.with_material(scene.material));
+        let frames = frames.transpose()?;
         Ok(Self {
             scene,
             snapshots: left.map_or_else(Vec::new, |left| left.checkpoint.snapshots.to_vec()),
@@ -134,8 +134,7 @@ impl<'a> Recorder<'a> {
     }
 
     fn measure(&mut self, engine: &Engine) {
-        let measured = self.scene.material.as_ref().and_then(|elastic| LoadStep::of(engine, elastic));
-        self.load_steps.extend(measured);
+        self.load_steps.extend(LoadStep::of(engine));
     }
 
     /// Whether there is a frame for ParaView of a step on the way.
@@ -148,7 +147,7 @@ impl<'a> Recorder<'a> {
         let start = Instant::now();
         let written = match (&mut self.frames, engine.parted()) {
             (Some(frames), _) => frames.write(engine),
-            (None, Some(team)) => write_piece(engine, team, self.scene.material.as_ref()),
+            (None, Some(team)) => write_piece(engine, team),
             (None, None) => Ok(()),
         };
         self.failure = written.err();

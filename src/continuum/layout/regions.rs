@@ -65,7 +65,7 @@ impl Layout {
             SceneRegion::Outline(selection) => outline.portions(selection, grain),
             SceneRegion::Outermost(side) => match band(*side, 0.0) {
                 flat if !flat.is_empty() => flat,
-                _ => band(*side, outermost_depth(*side, &self.body)),
+                _ => band(*side, self.outermost_depth(*side)),
             },
             SceneRegion::Known(region) => match region {
                 Region::All | Region::Boundary => outline.portions(&Selection::All, grain),
@@ -156,8 +156,15 @@ impl Layout {
         scene.refuse(key, message, "move or widen the region")
     }
 
-    /// The particles at the outermost coordinate on a side; of a body that has no flat side there, those about half
-    /// a spacing deep.
+    /// Whether the shape is flat on a side, so that its outermost particles are those along that.
+    pub(crate) fn is_flat(&self, side: Side) -> bool {
+        self.outline.as_ref().is_some_and(|outline| {
+            !self.portions_of(&SceneRegion::Known(Region::Edge { side, depth: 0.0 }), outline).is_empty()
+        })
+    }
+
+    /// The particles at the outermost coordinate on a side; of a body that has no flat side there, those half a spacing
+    /// deep, or of whole cells as deep as a row.
     fn outermost(&self, side: Side) -> Vec<usize> {
         let within = |depth: f64| Region::Edge { side, depth }.pick(&self.body, &self.neighbours);
         if self.body.outline.is_some() {
@@ -166,20 +173,24 @@ impl Layout {
                 return flat;
             }
         }
-        within(outermost_depth(side, &self.body))
+        within(self.outermost_depth(side))
     }
-}
 
-/// Deep enough for a staggered edge: less than one period of the lattice's rows across the side.
-fn outermost_depth(side: Side, body: &Body) -> f64 {
-    let k = usize::from(matches!(side, Side::Bottom | Side::Top));
-    let steps =
-        body.lattice.first_neighbours(0).into_iter().map(|offset| body.lattice.vector(offset)[k].abs());
-    let spacing = body.lattice.spacing();
-    let shortest = steps.clone().filter(|&step| step > 1e-6 * spacing).fold(f64::INFINITY, f64::min);
-    let longest = steps.fold(0.0, f64::max);
-    // Rows that are staggered by part of a period count as one edge.
-    if longest > 1.5 * shortest { 0.75 * longest } else { shortest / 2.0 }
+    /// Half a spacing; of whole cells deep enough for a staggered edge: less than one period of the lattice's rows across the
+    /// side.
+    fn outermost_depth(&self, side: Side) -> f64 {
+        let lattice = &self.body.lattice;
+        let spacing = lattice.spacing();
+        if self.body.outline.is_some() {
+            return 0.5 * spacing;
+        }
+        let k = usize::from(matches!(side, Side::Bottom | Side::Top));
+        let steps = lattice.first_neighbours(0).into_iter().map(|offset| lattice.vector(offset)[k].abs());
+        let shortest = steps.clone().filter(|&step| step > 1e-6 * spacing).fold(f64::INFINITY, f64::min);
+        let longest = steps.fold(0.0, f64::max);
+        // Rows that are staggered by part of a period count as one edge.
+        if longest > 1.5 * shortest { 0.75 * longest } else { shortest / 2.0 }
+    }
 }
 
 fn check_ids(scene: &Scene, key: &str, region: &SceneRegion, body: &Body) -> Result<(), SceneError> {

@@ -159,11 +159,8 @@ impl Shown<'_> {
 
     fn stress(&self, frame: usize) -> Vec<f64> {
         let displacement = self.displacement(frame);
-        let found = self
-            .scene
-            .material
-            .as_ref()
-            .and_then(|elastic| Stresses::of(self.engine, elastic, &displacement, &self.broken(frame)));
+        let step = self.recorder.frames()[frame].step;
+        let found = Stresses::of(self.engine, step, &displacement, &self.broken(frame));
         let none = || vec![f64::NAN; displacement.len()];
         let size = |found: Stresses| {
             let of = |one: &Option<StressState>| one.map_or(f64::NAN, |stress| stress.von_mises);

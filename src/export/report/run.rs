@@ -375,8 +375,7 @@ fn add_exact(stage: &mut View, scene: &Scene, engine: &Engine) {
     }
     let rotation = |strain: &Option<Strain>| strain.map_or(f64::NAN, |strain| strain.rotation);
     add("rotation", "rotation", "rad", &mut strains.iter().map(rotation));
-    let stresses = scene.material.as_ref().and_then(|elastic| Stresses::at_present(engine, elastic));
-    if let Some(Stresses { particles, .. }) = stresses {
+    if let Some(Stresses { particles, .. }) = Stresses::at_present(engine) {
         let unit = Units::of(scene).stress;
         let of = |number: fn(&StressState) -> f64| {
             particles.iter().map(move |stress| stress.as_ref().map_or(f64::NAN, number))

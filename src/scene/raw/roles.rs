@@ -53,7 +53,8 @@ pub enum RawRegion {
     Edge {
         /// The side on which the particles are outermost.
         side: RawSide,
-        /// How far in from the outermost coordinate [length]; half a spacing unless given.
+        /// How far in from the outermost coordinate [length]. Unless given it is a flat side itself, along a fitted outline; half
+        /// a spacing where that is curved; and of whole cells half a row of the lattice, or as much as rows are staggered.
         #[serde(default)]
         #[schemars(range(min = 0))]
         depth: Option<f64>,

@@ -153,7 +153,7 @@ pub fn compare(
     comparison.parts = ErrorParts::of(scene, &truth, &rule, &follows)?;
     let von_mises_rule = von_mises(&cells, elastic, &rule, rotation);
     let von_mises_truth = von_mises(&cells, elastic, known, rotation);
-    let stresses = Stresses::at_present(engine, elastic).filter(|_| !scene.record.places.is_empty());
+    let stresses = Stresses::at_present(engine).filter(|_| !scene.record.places.is_empty());
     let at_places = stresses.map_or_else(Vec::new, |stresses| at_places(scene, engine, &stresses));
     let places = compare_places(at_places, &truth.solution).map_err(|error| refused(scene, &error))?;
     Ok(Compared {

@@ -6,12 +6,14 @@
 //! that of a solved body, to which the truth's own is added: what is delivered is what was measured.
 
 use super::grid::{RuleChoice, body_overrides};
-use super::study::{Load, error_of};
+use super::study::{Load as LoadScene, error_of};
 use crate::continuum::equilibrium::solve_equilibrium;
+use crate::continuum::layout::Layout;
 use crate::continuum::run::Outcome;
+use crate::flock::region::Region;
 use crate::flock::role::Role;
-use crate::scene::raw::{RawMean, RawRegion};
-use crate::scene::{Scene, SceneError};
+use crate::scene::raw::RawMean;
+use crate::scene::{Load, Scene, SceneError, SceneRegion};
 use crate::solve::equilibrium::{Precision, Request};
 use crate::study::compare::reference::Effort;
 use crate::study::compare::run::{SceneReference, plan_led_by, reference_of};
@@ -46,7 +48,7 @@ pub struct Chosen {
 ///
 /// # Errors
 /// Names what keeps the scene from being refined or held against a truth, or how near it came.
-pub fn choose(scene: Scene, load: Load<'_>) -> Result<Chosen, SceneError> {
+pub fn choose(scene: Scene, load: LoadScene<'_>) -> Result<Chosen, SceneError> {
     let Some(accuracy) = scene.equilibrium.and_then(|asked| asked.accuracy) else {
         return Ok(Chosen { scene, words: String::new(), estimate: None });
     };
@@ -58,12 +60,9 @@ pub fn choose(scene: Scene, load: Load<'_>) -> Result<Chosen, SceneError> {
     let mut particles = 0;
     for halvings in 0..=MOST_HALVINGS {
         let part = 0.5f64.powi(halvings as i32);
-        if halvings > 0 {
-            require_refinable(&scene)?;
-            // Half the spacing is four times as many.
-            if 4 * particles > MOST_PARTICLES {
-                break;
-            }
+        // Half the spacing is four times as many.
+        if 4 * particles > MOST_PARTICLES {
+            break;
         }
         let body = Body::new(&scene, load, part, accuracy)?;
         let solved =
@@ -73,6 +72,7 @@ pub fn choose(scene: Scene, load: Load<'_>) -> Result<Chosen, SceneError> {
         if nearest <= accuracy {
             return body.cheapest(accuracy, solved.error);
         }
+        require_refinable(&scene, &body.truth.layout)?;
     }
     let message = format!(
         "the error is still {:.2} % at {particles} particles, after {MOST_HALVINGS} halvings of the spacing or as many as \
@@ -88,7 +88,7 @@ const DOUBLES: &str = "equilibrium.precision=\"f64\"";
 
 /// The scene at one spacing.
 struct Body<'a> {
-    load: Load<'a>,
+    load: LoadScene<'a>,
     overrides: Vec<String>,
     part: f64,
     /// As the scene's accuracy has it.
@@ -108,7 +108,7 @@ struct Solved {
 }
 
 impl<'a> Body<'a> {
-    fn new(scene: &Scene, load: Load<'a>, part: f64, accuracy: f64) -> Result<Self, SceneError> {
+    fn new(scene: &Scene, load: LoadScene<'a>, part: f64, accuracy: f64) -> Result<Self, SceneError> {
         let overrides = body_overrides(scene, RuleChoice::Material, part);
         let scene = load(&overrides)?;
         let effort = Effort { target: (OF_TRUTH * accuracy).min(1e-3), ..Effort::default() };
@@ -215,15 +215,34 @@ fn words(solved: &Solved, accuracy: f64, part: f64) -> String {
     )
 }
 
-/// Ids name other particles in a finer body.
-fn require_refinable(scene: &Scene) -> Result<(), SceneError> {
-    let by_id = |region: &RawRegion| matches!(region, RawRegion::Ids { .. });
-    let role = scene.raw.roles.iter().position(|entry| by_id(&entry.region));
-    let key = match role {
-        Some(k) => format!("roles[{k}].region"),
-        None if !scene.record.probes.is_empty() => "record.probes".into(),
-        None => return Ok(()),
+/// What a finer body has others of, or more: particles with these ids, outermost ones, pushed ones.
+fn require_refinable(scene: &Scene, layout: &Layout) -> Result<(), SceneError> {
+    const OR: &str = "write a smaller spacing, or ask for less";
+    let refuse = |key: &str, what: &str, help: &str| {
+        Err(scene.refuse(key, format!("the accuracy takes a finer body, {what}"), format!("{help}, {OR}")))
     };
-    let message = "the accuracy takes a finer body, in which these ids are other particles";
-    Err(scene.refuse(&key, message, "pick particles by place, write a smaller spacing, or ask for less"))
+    let of_roles =
+        scene.roles.iter().enumerate().map(|(k, entry)| (format!("roles[{k}].region"), &entry.region));
+    let of_loads = scene.loads.iter().enumerate().filter_map(|(k, load)| {
+        let (Load::Outline { region, .. } | Load::Force { region, .. }) = load else { return None };
+        Some((format!("loads[{k}].region"), region))
+    });
+    if let Some(k) = scene.loads.iter().position(|load| matches!(load, Load::Force { .. })) {
+        return refuse(&format!("loads[{k}].force"), "in which it pushes more particles", "give a traction");
+    }
+    for (key, region) in of_roles.chain(of_loads) {
+        match region {
+            SceneRegion::Known(Region::Ids(_)) => {
+                return refuse(&key, "in which these ids are other particles", "pick particles by place");
+            }
+            SceneRegion::Outermost(side) if !layout.is_flat(*side) => {
+                return refuse(&key, "in which less of a curved side is outermost", "give the edge a depth");
+            }
+            _ => {}
+        }
+    }
+    if !scene.record.probes.is_empty() {
+        return refuse("record.probes", "in which these ids are other particles", "record.places instead");
+    }
+    Ok(())
 }
