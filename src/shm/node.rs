@@ -15,6 +15,7 @@ use crate::swarm::control::Control;
 use crate::swarm::control::scope::NodeScope;
 use crate::swarm::control::state::{FormationState, MemberState};
 use crate::swarm::pace::{Due, Pace, system_time};
+use crate::swarm::plan::cautions;
 use crate::swarm::transport::complaints::Complaints;
 use crate::swarm::transport::{listen, serve};
 
@@ -57,6 +58,9 @@ impl FormationNode {
     pub fn open(swarm: &Swarm, domain: &Domain, member: Option<&str>) -> Result<Self, ShmError> {
         let mut control = Control::new(swarm)?;
         let part = NodeScope::take(swarm, &mut control, member)?;
+        if let Some(caution) = cautions::late_without_speed(control.limits()) {
+            tracing::warn!("{caution}");
+        }
         let peer = domain.join("flockform_node")?;
         let (space, capacity) = (&swarm.name, &Capacity::SWARM);
         Ok(Self {

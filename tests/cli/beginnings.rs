@@ -138,9 +138,12 @@ fn the_plan_of_a_swarm_states_margins_and_speeds() {
     assert!((plan["noise"]["largest"].as_f64().expect("kept apart") - 0.8 / 6.0).abs() < 1e-9, "{plan}");
     // Followers that are in their places at once set no speed, and ideal robots none either.
     assert_eq!(plan["speed"]["reachable"], 0.7);
-    let ideal = said(&["plan", "gap"], folder.path());
+    let unlimited = ["plan", "gap", "--set", "limits={ clearance = 0.1 }"];
+    let ideal = said(&unlimited, folder.path());
     assert!(ideal.contains("  reachable speed   not limited: ideal robots"), "{ideal}");
-    assert!(json(&["plan", "gap", "--json"], folder.path())["speed"]["reachable"].is_null(), "{ideal}");
+    assert!(ideal.contains("limits.clearance without limits.speed holds for poses of now alone"), "{ideal}");
+    let planned = json(&[&unlimited[..], &["--json"]].concat(), folder.path());
+    assert!(planned["speed"]["reachable"].is_null(), "{ideal}");
     for name in ["gap", "patch", "antipodal", "faulty-robot", "bridge"] {
         assert!(said(&["plan", name], folder.path()).contains("robots"), "{name}");
     }

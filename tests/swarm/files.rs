@@ -63,6 +63,15 @@ fn a_bad_swarm_file_is_refused_with_place_and_remedy() {
             with("[flight.bounds]\ncontinuum_error = 0.1\n"),
             "flight.bounds.continuum_error = 0.1: can never be measured",
         ),
+        (with("[limits]\nclearance = 0.2\n[flight]\ndelay = 1\n"), "by flight.delay poses come late"),
+        (with("[limits]\nclearance = 0.2\n[flight]\njitter = 2\n"), "by flight.jitter poses come late"),
+        (with("[limits]\nclearance = 0.2\n[flight]\nloss = 0.1\n"), "give limits.speed, above what"),
+        (
+            with(
+                "[limits]\nclearance = 0.2\n[[flight.commands]]\nafter = 3\nwhat = { kind = \"channel\", noise = 0.0, delay = 2, loss = 0.0 }\n",
+            ),
+            "by flight.commands[0] poses come late",
+        ),
         (with("[poses]\nrange = 0.5\n"), "and poses farther than poses.range (0.5 m) are rejected"),
         (with("[flight]\nduration = 1e15\n"), "periods; a flight has 1e7 at most"),
         (with("[limits]\nspeed = 1.0\n[ranges]\nmax_faulty = 2\n"), "there are 2 that could measure it"),
@@ -167,6 +176,9 @@ fn what_is_doubtful_is_a_caution_before_the_flight() {
         let cautions = square(more);
         assert!(cautions.iter().any(|caution| caution.contains(expected)), "{more:?}: {cautions:?}");
     }
+    let silent = "[limits]\nclearance = 0.2\n[flight]\nfaults = [{ robot = \"b\", at = 1.0, what = { kind = \"silent\" } }]\n";
+    let cautions = plan_of(&parse(&format!("{PAIR}{silent}")).expect("valid"));
+    assert!(cautions.iter().any(|one| one.contains("how far `b` goes once it is not heard")), "{cautions:?}");
     let apart = "title = \"t\"\nlinks = { kind = \"listed\" }\n\
                  robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [1.0, 0.0], neighbours = [\"a\"] },\n\
                  { name = \"c\", place = [2.0, 0.0], neighbours = [\"d\"] }, { name = \"d\", place = [3.0, 0.0], neighbours = [\"c\"] }]\n\

@@ -46,6 +46,7 @@ use crate::scene::swarm::raw::RawService;
 use crate::swarm::control::Control;
 use crate::swarm::control::scope::NodeScope;
 use crate::swarm::pace::{Pace, system_time};
+use crate::swarm::plan::cautions;
 use crate::swarm::transport::complaints::Complaints;
 use crate::swarm::transport::{ControllerEnd, listen, targets};
 pub use commands::{Answer, CommandQueue, NodeCommand};
@@ -163,6 +164,9 @@ impl FormationNode {
             control,
         };
         this.settings.apply_all(this.parameters.iter(), &mut this.control, &mut this.pace);
+        if let Some(caution) = cautions::late_without_speed(this.control.limits()) {
+            tracing::warn!("{caution}");
+        }
         this.origin.take_names(&this.parameters);
         this.origin.check_topics()?;
         if this.settings.autostart {

@@ -296,6 +296,14 @@ fn check_flight(raw: &RawSwarm, refuse: Refuse<'_>) -> Result<(), SceneError> {
         let message = "this model of a robot needs a limit".into();
         return Err(refuse(key, message, "give it, or use flight.model = { kind = \"ideal\" }"));
     }
+    if let Some(key) = late(&raw.flight).filter(|_| raw.limits.clearance.is_some() && speed.is_none()) {
+        let message = format!(
+            "cannot be kept: by {key} poses come late or not at all, and without limits.speed a robot may be anywhere by \
+             then"
+        );
+        let help = format!("give limits.speed, above what the programs ask for, or leave out {key}");
+        return Err(refuse("limits.clearance", message, &help));
+    }
     let starts: Vec<&String> = raw.flight.start.iter().map(|start| &start.robot).collect();
     if let Some(n) = repeated(&starts) {
         let message = format!("`{}` has a place to start at already", starts[n]);
@@ -308,6 +316,17 @@ fn check_flight(raw: &RawSwarm, refuse: Refuse<'_>) -> Result<(), SceneError> {
         }
     }
     Ok(())
+}
+
+/// The key by which the others may have no present pose of a robot.
+fn late(flight: &RawFlight) -> Option<String> {
+    let channel = [("delay", flight.delay > 0), ("jitter", flight.jitter > 0), ("loss", flight.loss > 0.0)];
+    let is_late = |what: &RawCommandKind| matches!(what, RawCommandKind::Channel { delay, loss, .. } if *delay > 0 || *loss > 0.0);
+    let own = channel.iter().find(|(_, is_late)| *is_late).map(|(key, _)| format!("flight.{key}"));
+    own.or_else(|| {
+        let command = flight.commands.iter().position(|command| is_late(&command.what))?;
+        Some(format!("flight.commands[{command}]"))
+    })
 }
 
 fn manoeuvres(raw: &RawSwarm, refuse: Refuse<'_>) -> Result<Vec<NamedManoeuvre>, SceneError> {

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::formation::{Formation, LeadSnapshot, Measures, Seen};
 use super::resilience::trim;
 use super::robots::DoubleIntegrator;
-use super::safety::{self, Filter, Flags, Limits, SafetyError};
+use super::safety::{self, Filter, Flags, Limits, SafetyError, Stray};
 use super::transport::Received;
 use super::watch::{Gains, Health, Pose, Range, Rejection, Track, Watch};
 use crate::flock::manoeuvre::Manoeuvre;
@@ -60,7 +60,7 @@ struct Tracked {
     present: Vectors,
     velocity: Vectors,
     ages: Vec<f64>,
-    strays: Vec<f64>,
+    strays: Vec<Stray>,
 }
 
 /// The loop's state. Members by number, positions in \[m\], world frame, times in \[s\].
@@ -145,7 +145,7 @@ impl Control {
                 present: formation.places.clone(),
                 velocity: Vectors::zeros(count),
                 ages: vec![0.0; count],
-                strays: vec![0.0; count],
+                strays: vec![Stray::default(); count],
             },
             filtered: vec![Flags::default(); count],
             flags: vec![0; count],
@@ -407,25 +407,28 @@ impl Control {
         }
     }
 
-    /// Estimates the present states of members that take time to brake. The targets of a member of another node are
-    /// not known here, and a lost member need not follow its own: both keep their last poses with the age of these,
-    /// and velocities that are older still.
+    /// Estimates the present states of members that take time to brake, and where they may be if they do not follow their
+    /// targets: a lost one is where it was left to itself. The targets of a member of another node are not known here, and
+    /// none were sent to a place that is not of the member's own poses: there the last place counts, with its age, and
+    /// velocities that are older still.
     fn follow_tracks(&mut self, now: f64) {
         let dynamics = self.dynamics();
         let gains = Gains::of(dynamics.acceleration, self.period, self.filter.limits().deviation);
         let Tracked { present, velocity, ages, strays } = &mut self.tracked;
         for (member, track) in self.tracks.iter().enumerate() {
-            if self.serves[member] && self.usable[member] {
-                let robot = track.at(now, &dynamics);
+            let stray = &mut strays[member];
+            if self.serves[member] && track.is_of(self.present.get(member)) {
+                let robot = track.at(now, &dynamics, self.period, &mut stray.places);
                 present.set(member, robot.position);
                 velocity.set(member, robot.velocity);
                 ages[member] = 0.0;
-                strays[member] = track.stray(&robot, now, &dynamics, &gains, self.period);
+                stray.error = track.stray(&robot, now, &dynamics, &gains, self.period);
             } else {
                 present.set(member, self.present.get(member));
                 velocity.set(member, self.velocity.get(member));
                 ages[member] = 2.0 * self.ages[member] + self.period;
-                strays[member] = 0.0;
+                stray.error = 0.0;
+                stray.places.clear();
             }
         }
     }

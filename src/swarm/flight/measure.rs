@@ -2,6 +2,7 @@
 //! the robots without a fault at the time.
 
 use super::Flight;
+use super::acceleration::Accelerations;
 use super::moment::Extreme;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::swarm::Swarm;
@@ -45,6 +46,8 @@ pub struct Record {
     pub(super) closest: Option<Extreme>,
     /// The robot farthest from its place in each period: by the affine motion, by the rule, by the continuum.
     pub(super) farthest: Vec<[Option<Extreme>; 3]>,
+    /// Where there is a limit.
+    pub(super) accelerations: Option<Accelerations>,
     /// Members that led at the start.
     pub(super) leaders: usize,
     every: usize,
@@ -64,6 +67,7 @@ impl Record {
             clearances: vec![f64::INFINITY; count],
             closest: None,
             farthest: Vec::new(),
+            accelerations: swarm.raw.limits.acceleration.map(|limit| Accelerations::new(limit, flight)),
             leaders: (0..count).filter(|&m| formation.leads(m)).count(),
             every: swarm.raw.flight.record_every,
             around: Vec::new(),
@@ -77,6 +81,9 @@ impl Record {
         let present = flight.fleet().places();
         for (m, way) in self.ways.iter_mut().enumerate() {
             *way += distance(before.get(m), present.get(m));
+        }
+        if let Some(accelerations) = &mut self.accelerations {
+            accelerations.take(flight, control.period());
         }
         control.filter().clearance_on_the_way(before, &present, &mut self.around);
         for (least, &now) in self.clearances.iter_mut().zip(&self.around) {

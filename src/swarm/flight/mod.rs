@@ -3,6 +3,7 @@
 //! In a period every robot sends its pose, the channels deliver, the control ticks, and every robot goes towards
 //! its target. A real swarm's period is the same, so a simulated flight tests the tick that flies real robots.
 
+mod acceleration;
 mod alarms;
 mod beginning;
 pub(crate) mod commands;
@@ -24,6 +25,7 @@ use crate::engine::Engine;
 use crate::flock::vectors::distance;
 use crate::scene::SceneError;
 use crate::scene::swarm::{Shape, Swarm};
+pub use acceleration::AccelerationReport;
 pub use alarms::Alarm;
 pub use commands::FlightCommand;
 pub use fleet::Fleet;

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::moment::Extreme;
-use super::{Flight, Moment, Record, Sample};
+use super::{AccelerationReport, Flight, Moment, Record, Sample};
 use crate::flock::role::Role;
 use crate::scene::swarm::Swarm;
 
@@ -39,6 +39,8 @@ pub struct FlightReport {
     pub clearance: Option<f64>,
     /// The robots that came that close, when and where.
     pub closest: Option<Moment>,
+    /// How far the limit of acceleration was kept; absent where there is none.
+    pub acceleration: Option<AccelerationReport>,
     /// Largest distance from the continuum run of the same scene; absent where there is none.
     pub continuum_error: Option<f64>,
     /// Largest sum of PE1, and at the end \[m^2\].
@@ -128,6 +130,7 @@ impl FlightReport {
             ("From the continuum run", from_continuum),
             ("Settling time", Some(settled)),
             ("Smallest clearance", clearance),
+            ("Largest acceleration", self.acceleration.as_ref().map(|one| one.words(&number))),
             ("Way", Some(way)),
             ("Robots lost", (self.most_lost > 0).then(|| format!("{} at one time", self.most_lost))),
         ];
@@ -155,6 +158,7 @@ impl FlightReport {
             settled_within: bounds.settled_within,
             closest: record.closest.map(|closest| closest.named(&formation.names)),
             clearance: finite(samples.iter().map(|s| s.clearance).fold(f64::INFINITY, f64::min)),
+            acceleration: record.accelerations.as_ref().map(|one| one.report(&formation.names)),
             continuum_error: largest_and_last(samples, |s| s.continuum_error).map(|[largest, _]| largest),
             pe1: largest_and_last(samples, |s| Some(s.pe1)).unwrap_or_default(),
             strain: largest_and_last(samples, |s| Some(s.strain)).unwrap_or_default(),

@@ -4,16 +4,25 @@ use super::{ManoeuvreSpeed, largest_noise, needed};
 use crate::flock::manoeuvre::Manoeuvre;
 use crate::flock::motion::{Keyframe, Motion};
 use crate::flock::vectors::distance;
-use crate::scene::swarm::raw::RawSwarm;
+use crate::scene::swarm::raw::{RawFaultKind, RawSwarm};
 use crate::scene::swarm::{Program, Swarm};
 use crate::swarm::flight::Flight;
 use crate::swarm::formation::Formation;
+use crate::swarm::safety::Limits;
 
 /// Parts of a leg or of a program between which a leader's way is looked at.
 const PARTS: usize = 40;
 
 /// Less than this is rounding \[m\] or \[m/s\].
 const ROUNDING: f64 = 1e-9;
+
+/// Poses of real robots are always late, if only by their way through the network.
+pub fn late_without_speed(limits: &Limits) -> Option<&'static str> {
+    (limits.keeps_apart && limits.speed.is_infinite()).then_some(
+        "limits.clearance without limits.speed holds for poses of now alone, and those of real robots are late: give \
+         limits.speed",
+    )
+}
 
 /// All of them.
 pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
@@ -24,6 +33,7 @@ pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
         delay(raw),
         (raw.flight.loss >= 1.0)
             .then(|| "every pose is lost: no robot will get a target; lower flight.loss".to_owned()),
+        silent(raw, flight),
         unled(formation),
         unmeasured(raw, formation),
         outside(flight, "start", &|m| flight.fleet().robots()[m].position),
@@ -60,6 +70,17 @@ fn delay(raw: &RawSwarm) -> Option<String> {
          flight.jitter or raise the limit"
             .into()
     })
+}
+
+/// Robots that move on while nobody hears where, at any speed.
+fn silent(raw: &RawSwarm, flight: &Flight) -> Option<String> {
+    use RawFaultKind::{NotANumber, Silent, WrongFrame};
+    late_without_speed(flight.control().limits())?;
+    let fault = raw.flight.faults.iter().find(|one| matches!(one.what, Silent | NotANumber | WrongFrame))?;
+    Some(format!(
+        "nobody knows how far `{}` goes once it is not heard: no clearance from it is kept; give limits.speed",
+        fault.robot
+    ))
 }
 
 /// Robots that no leader reaches by links that last.

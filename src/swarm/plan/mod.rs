@@ -181,7 +181,8 @@ impl SwarmPlan {
             convergence,
             cautions: Vec::new(),
         };
-        plan.cautions = lasting(&plan).into_iter().chain(cautions::of(swarm, &flight)).collect();
+        let real = cautions::late_without_speed(flight.control().limits()).map(str::to_owned);
+        plan.cautions = lasting(&plan).into_iter().chain(cautions::of(swarm, &flight)).chain(real).collect();
         Ok(plan)
     }
 }

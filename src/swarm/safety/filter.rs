@@ -5,6 +5,7 @@ use super::deadlock::Detour;
 use super::limits::{Limits, SafetyError};
 use super::obstacles::Obstacles;
 use super::step::TOUCHING;
+use super::ways::Ways;
 use crate::flock::grid::CellGrid;
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::vectors::{Vectors, distance};
@@ -54,9 +55,17 @@ pub struct Seen<'a> {
     /// Present velocities \[m/s\]; without them no acceleration is limited. Of members that brake
     /// ([`Limits::brakes`]) places and velocities are to be estimates of the present ones.
     pub velocity: Option<&'a Vectors>,
-    /// Error bounds of the ways on which members come to rest, because their velocities are not known exactly
-    /// \[m\]; zero without it.
-    pub strays: Option<&'a [f64]>,
+    /// What members that brake may do otherwise; nothing without it.
+    pub strays: Option<&'a [Stray]>,
+}
+
+/// What a member that brakes may do otherwise than it is seen to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Stray {
+    /// Error bound of the way on which it comes to rest, because its velocity is not known exactly \[m\].
+    pub error: f64,
+    /// Places where it may be, or come to rest, if it has not done what it was sent to \[m\].
+    pub places: Vec<[f64; 2]>,
 }
 
 /// The safety filter of a swarm. A tick allocates no memory once the buffers have grown.
@@ -88,7 +97,9 @@ pub(super) struct Crowd {
     drift: f64,
     /// Places at which members come to rest if they brake now \[m\]; empty where members need no way to brake.
     pub(super) rest: Vec<[f64; 2]>,
-    /// Longest way there \[m\].
+    /// All that each of those may take until it is at rest; those of members that went before are kept for their memory.
+    pub(super) ways: Vec<Ways>,
+    /// Largest distance of such a place from its member \[m\].
     longest: f64,
     /// Members near the current one, in order of index.
     pub(super) found: Vec<u32>,
@@ -210,10 +221,13 @@ impl Filter {
         crowd.rest.clear();
         crowd.longest = 0.0;
         if self.brakes(seen) {
+            self.crowd.ways.resize_with(count, Ways::default);
             for member in 0..count {
                 let rest = self.resting_place(seen, period, member);
-                let way = distance(rest, seen.present.get(member));
-                self.crowd.longest = self.crowd.longest.max(if way.is_finite() { way } else { 0.0 });
+                let places = seen.strays.map_or(&[][..], |strays| &strays[member].places);
+                let ways = &mut self.crowd.ways[member];
+                ways.take(seen.present.get(member), rest, places);
+                self.crowd.longest = self.crowd.longest.max(ways.extent);
                 self.crowd.rest.push(rest);
             }
         }

@@ -53,11 +53,27 @@
 //! safe swarm behavior", IFAC-PapersOnLine 48(27), 2015) on each half-plane of a buffered Voronoi cell, in discrete time
 //! and with the whole way in place of the distance, so that no rate has to be chosen. It takes places and velocities of
 //! now: [`Control`](super::control::Control) has them from its members' model ([`Track`](super::watch::Track)), which is
-//! exact, however late poses are, for members that follow their model; others are not covered.
+//! exact, however late poses are, for members that follow their model.
+//!
+//! # Members that do not follow their targets
+//! Between its last pose and now a member may have stopped following its targets: it stands, brakes, or goes on to the last
+//! one it got. It is then at a place that it was taken to pass since ([`Stray::places`]), or comes to rest on the way from
+//! there on which it was taken to be able to. So of a member whose last pose is not of now the convex hull of all these
+//! ways stands for `B_i` in the claim above, whose proof stays as it is: the hull of the next tick is that of this one, `q`
+//! and `e`, all of which lie in the cell, and a pose that agrees with the model only takes places away. A member that is
+//! lost gets no target; its hull grows until it is at rest by its model, and stays.
+//!
+//! A pose that disagrees with the model moves the hull, perhaps to where others are. Then one more border parts a member
+//! from each single place of the other's. The other's true place was in its hull before, so that the member is clear of that, and
+//! stays clear of it. A member that does what its model cannot is not covered, nor one that goes on, after a fault, from
+//! elsewhere than its targets were meant for, beyond its next pose.
+//!
+//! Of members whose targets are not known (other nodes send them), the last pose counts, by its age: they may be anywhere
+//! within what their limits allow, and a member that is perhaps too near goes on along its way or away from all of that.
 //!
 //! Members without that flag go no faster than lets them brake before every border of their cell, as it stands.
 //! Where a border comes too fast the cell is kept and the acceleration exceeded, with
-//! [`Flags::ACCELERATION_LIMITED`] set. A late pose is of a place that its member has left, and two noisy ones give no
+//! [`Flags::ACCELERATION_LIMITED`] set and the origin of the border; a flight reports how often. A late pose is of a place that its member has left, and two noisy ones give no
 //! velocity: such a member is taken to go from target to target, whose changes are then what the limit bounds.
 //!
 //! # Noise
@@ -87,8 +103,9 @@ mod filter;
 mod limits;
 mod obstacles;
 mod step;
+mod ways;
 
 pub use deadlock::Patience;
-pub use filter::{Filter, Flags, Seen};
+pub use filter::{Filter, Flags, Seen, Stray};
 pub use limits::{Limits, Place, SafetyError};
 pub use obstacles::{Obstacle, Obstacles};

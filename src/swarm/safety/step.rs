@@ -1,10 +1,10 @@
 //! One member's part of a tick: its cell, and its step within it.
 
-use super::cell::{HalfPlane, length, nearest, shortened};
+use super::cell::{HalfPlane, length, shortened};
 use super::deadlock::Tick;
 use super::filter::{Filter, Flags, Seen};
+use super::ways::Border;
 use crate::geometry::point::dot;
-use crate::geometry::shape::segments_cross;
 
 /// A member's wanted way at this tick, and its reach.
 #[derive(Clone, Copy)]
@@ -73,7 +73,9 @@ impl Filter {
         };
         let step = match motion {
             Some(Motion { velocity, .. }) if brakes => self.brakable(velocity, goal, period, &mut flags),
-            Some(motion) => shortened(self.steered(motion, goal, period, &request, &mut flags), request.step),
+            Some(motion) => {
+                shortened(self.steered(motion, goal, period, (&request, origins), &mut flags), request.step)
+            }
             None => shortened(goal, request.step),
         };
         let step = self.cast(here, step, origins, member);
@@ -138,7 +140,7 @@ impl Filter {
 
     fn build_cell(&mut self, seen: &Seen, reach: f64, member: usize) -> Origins {
         self.cell.planes.clear();
-        let noise = seen.strays.map_or(0.0, |strays| strays[member]);
+        let noise = seen.strays.map_or(0.0, |strays| strays[member].error);
         // Borders that come within reach once the noise is taken off count too.
         let reach = reach + noise;
         self.find(seen, reach, member);
@@ -154,9 +156,10 @@ impl Filter {
             // Two at the very same place part: the lower number to the left.
             let aside = if member < other { [1.0, 0.0] } else { [-1.0, 0.0] };
             let there = seen.present.get(other);
-            if brakes && (rest != here || self.crowd.rest[other] != there) {
-                let ways = [[here, rest], [there, self.crowd.rest[other]]];
-                add_border_of_ways(&mut self.cell.planes, ways, keep, stray, reach);
+            let ways = brakes.then(|| [member, other].map(|m| &self.crowd.ways[m]));
+            if let Some(ways) = ways.filter(|ways| !ways.iter().all(|ways| ways.is_point())) {
+                let places = seen.strays.map_or(&[][..], |strays| &strays[other].places);
+                Border { ways, places, keep, stray, reach }.add(&mut self.cell.planes);
             } else {
                 add_border(&mut self.cell.planes, [here, there, aside], keep, stray, reach);
             }
@@ -253,7 +256,7 @@ impl Filter {
         Motion { from, velocity }: Motion,
         goal: [f64; 2],
         period: f64,
-        request: &MotionRequest,
+        (request, origins): (&MotionRequest, Origins),
         flags: &mut Flags,
     ) -> [f64; 2] {
         let change = [0, 1].map(|k| (goal[k] - from[k]) / period - velocity[k]);
@@ -263,6 +266,7 @@ impl Filter {
         }
         flags.0 |= Flags::ACCELERATION_LIMITED;
         let next = [0, 1].map(|k| from[k] + (velocity[k] + held[k]) * period);
+        flags.0 |= self.why(next, origins).0;
         self.cell.nearest(next, request.step)
     }
 
@@ -334,35 +338,6 @@ fn add_border(
     }
     if sine >= 1.0 {
         planes.push(HalfPlane { normal: [-normal[0], -normal[1]], offset: (-fresh).max(0.0) });
-    }
-}
-
-/// As [`add_border`], for members whose ways until they are at rest are given: the border parts the ways.
-fn add_border_of_ways(
-    planes: &mut Vec<HalfPlane>,
-    ways: [[[f64; 2]; 2]; 2],
-    keep: f64,
-    stray: f64,
-    reach: f64,
-) {
-    let here = ways[0][0];
-    let [mut near, far] = nearest(ways[0], ways[1]);
-    let mut way = [far[0] - near[0], far[1] - near[1]];
-    let [[a, b], [c, d]] = ways;
-    if length(way) < keep && segments_cross(a, b, c, d) {
-        // Away from where the other is: the ways have no distance.
-        near = here;
-        way = [c[0] - a[0], c[1] - a[1]];
-    }
-    let distance = length(way);
-    let normal = if distance > 0.0 { [way[0] / distance, way[1] / distance] } else { [1.0, 0.0] };
-    let ahead = dot(normal, [near[0] - here[0], near[1] - here[1]]);
-    let fresh = (distance - keep) / 2.0 + ahead;
-    let sine = (stray / distance).min(1.0);
-    let turned = (2.0 - 2.0 * (1.0 - sine * sine).sqrt()).sqrt() * reach;
-    let offset = aged(fresh - stray - turned, fresh);
-    if offset < reach {
-        planes.push(HalfPlane { normal, offset });
     }
 }
 

@@ -51,6 +51,11 @@ pub struct Track {
     robot: Robot,
     /// \[s\]; absent before the first pose.
     stamp: Option<f64>,
+    /// The place of the last pose \[m\].
+    seen: [f64; 2],
+    /// Bound on the error of the velocity where the last pose disagreed with the model: what the robot has done since the
+    /// one before is then not known \[m/s\].
+    doubt: f64,
     /// Targets sent since, each with the time from which it holds \[s\].
     sent: VecDeque<(f64, Option<[f64; 2]>)>,
 }
@@ -58,9 +63,23 @@ pub struct Track {
 /// Targets that are kept: older ones are of a robot that has long been lost.
 const MOST_SENT: usize = 1024;
 
+/// Distance of a pose from the model up to which they agree, in units of the way that the acceleration makes \[1\], and
+/// of the deviation of poses \[1\].
+const SURPRISE: f64 = 1e-6;
+const NOISE: f64 = 9.0;
+
+/// Speed below which a robot is at rest, in units of what it takes up in a period \[1\].
+const AT_REST: f64 = 1e-12;
+
 impl Default for Track {
     fn default() -> Self {
-        Self { robot: Robot::at([0.0; 2], 0.0), stamp: None, sent: VecDeque::new() }
+        Self {
+            robot: Robot::at([0.0; 2], 0.0),
+            stamp: None,
+            seen: [0.0; 2],
+            doubt: 0.0,
+            sent: VecDeque::new(),
+        }
     }
 }
 
@@ -70,13 +89,17 @@ impl Track {
         let Some(since) = self.stamp.filter(|&since| since < pose.stamp) else {
             return self.restart(pose);
         };
-        let expected = self.run(pose.stamp, dynamics);
+        let expected = self.run(self.robot, pose.stamp, dynamics, period, &mut |_| {});
         let surprise = [0, 1].map(|k| pose.position[k] - expected.position[k]);
         let time = (pose.stamp - since).max(period);
         // Farther than it can have gone: the pose gives no information on its velocity.
         if distance(pose.position, expected.position) > 2.0 * dynamics.speed * time + 12.0 * deviation {
             return self.restart(pose);
         }
+        let off = distance(pose.position, expected.position);
+        let is_surprise = off > SURPRISE * dynamics.acceleration * time * time + NOISE * deviation;
+        let most = dynamics.acceleration * time;
+        self.doubt = if is_surprise { most.min((2.0 * off / time).max(0.5 * self.doubt)) } else { 0.0 };
         let gains = Gains::of(dynamics.acceleration, period, deviation);
         self.robot = expected;
         self.robot.position = [0, 1].map(|k| expected.position[k] + gains.alpha * surprise[k]);
@@ -85,15 +108,19 @@ impl Track {
         if speed > dynamics.speed {
             self.robot.velocity = self.robot.velocity.map(|v| v * dynamics.speed / speed);
         }
-        self.stamp = Some(pose.stamp);
-        // The one that holds at that time is still needed.
-        while self.sent.get(1).is_some_and(|&(from, _)| from <= pose.stamp) {
-            self.sent.pop_front();
-        }
+        self.begin(pose);
+    }
+
+    /// Whether the last pose that was believed is of this place \[m\].
+    pub fn is_of(&self, place: [f64; 2]) -> bool {
+        self.stamp.is_some() && self.seen == place
     }
 
     /// Notes the target \[m\] that holds from `now` \[s\] on; `None` where the robot is to come to rest.
     pub fn send(&mut self, now: f64, target: Option<[f64; 2]>) {
+        if target.is_none() && self.sent.back().is_some_and(|(_, last)| last.is_none()) {
+            return;
+        }
         if self.sent.len() == MOST_SENT {
             self.sent.pop_front();
         }
@@ -115,26 +142,82 @@ impl Track {
         3.0 * (speed / dynamics.acceleration + period + age) * gains.velocity_deviation
     }
 
-    /// The robot at `now` \[s\].
-    pub fn at(&self, now: f64, dynamics: &DoubleIntegrator) -> Robot {
-        self.run(now, dynamics)
+    /// The robot at `now` \[s\] if it follows its targets. Where it is if it stopped following them at some time since its
+    /// last pose is put into `places` \[m\]: it may stand where it was by then, or come to rest from there.
+    pub fn at(
+        &self,
+        now: f64,
+        dynamics: &DoubleIntegrator,
+        period: f64,
+        places: &mut Vec<[f64; 2]>,
+    ) -> Robot {
+        places.clear();
+        let mut note = |robot: &Robot| {
+            let [x, y] = robot.position;
+            let way = dynamics.braking_way(robot.velocity, period);
+            places.extend([[x, y], [x + way[0], y + way[1]]]);
+        };
+        let found = self.run(self.robot, now, dynamics, period, &mut note);
+        if self.doubt > 0.0 {
+            let [x, y] = self.robot.velocity;
+            let by = self.doubt;
+            for velocity in [[0.0; 2], [x + by, y], [x - by, y], [x, y + by], [x, y - by]] {
+                let other = self.run(Robot { velocity, ..self.robot }, now, dynamics, period, &mut note);
+                note(&other);
+            }
+        }
+        found
     }
 
     fn restart(&mut self, pose: &Pose) {
-        self.robot = Robot::at(pose.position, pose.yaw);
-        self.stamp = Some(pose.stamp);
-        self.sent.retain(|&(from, _)| from >= pose.stamp);
+        // The clock has been set back: times of before mean nothing.
+        if self.stamp.is_none_or(|stamp| stamp >= pose.stamp) {
+            self.sent.clear();
+        }
+        (self.robot, self.doubt) = (Robot::at(pose.position, pose.yaw), 0.0);
+        self.begin(pose);
     }
 
-    /// The model from `stamp` until a time \[s\].
-    fn run(&self, until: f64, dynamics: &DoubleIntegrator) -> Robot {
-        let mut robot = self.robot;
+    /// Takes a pose for the last one.
+    fn begin(&mut self, pose: &Pose) {
+        (self.stamp, self.seen) = (Some(pose.stamp), pose.position);
+        // The target that holds at that time is still needed.
+        while self.sent.get(1).is_some_and(|&(from, _)| from <= pose.stamp) {
+            self.sent.pop_front();
+        }
+    }
+
+    /// The model from this state at `stamp` until a time \[s\]; `leaves` sees the robot wherever it begins to go somewhere else.
+    fn run(
+        &self,
+        mut robot: Robot,
+        until: f64,
+        dynamics: &DoubleIntegrator,
+        period: f64,
+        leaves: &mut dyn FnMut(&Robot),
+    ) -> Robot {
         let Some(stamp) = self.stamp else { return robot };
         let model = Model::DoubleIntegrator(*dynamics);
+        let mut step = |robot: &mut Robot, target: [f64; 2], time: f64| {
+            if time > 0.0 {
+                leaves(robot);
+                robot.step(&model, target, time);
+            }
+        };
+        let at_rest = AT_REST * dynamics.acceleration * period;
         for (k, &(from, target)) in self.sent.iter().enumerate() {
             let end = self.sent.get(k + 1).map_or(until, |&(next, _)| next.min(until));
-            let target = target.unwrap_or(robot.position);
-            robot.step(&model, target, end - from.max(stamp));
+            let mut time = from.max(stamp);
+            if let Some(target) = target {
+                step(&mut robot, target, end - time);
+                continue;
+            }
+            // In every period it is sent to where it is by then.
+            while time < end && robot.velocity[0].hypot(robot.velocity[1]) > at_rest {
+                let here = robot.position;
+                step(&mut robot, here, period.min(end - time));
+                time += period;
+            }
         }
         robot
     }
@@ -164,7 +247,7 @@ mod tests {
             }
             // The first poses have nothing to be smoothed with.
             if k >= late + if deviation > 0.0 { SETTLED } else { 0 } {
-                let found = track.at(now, &DYNAMICS);
+                let found = track.at(now, &DYNAMICS, PERIOD, &mut Vec::new());
                 place = place.max(distance(found.position, robot.position));
                 velocity = velocity.max(distance(found.velocity, robot.velocity));
             }
@@ -203,7 +286,7 @@ mod tests {
             let now = f64::from(k) * PERIOD;
             let pose = Pose { position: [1.0, 2.0], yaw: 0.0, stamp: now, frame_is_right: true };
             track.correct(&pose, &DYNAMICS, PERIOD, 0.0);
-            let found = track.at(now, &DYNAMICS);
+            let found = track.at(now, &DYNAMICS, PERIOD, &mut Vec::new());
             assert!(distance(found.velocity, [0.0; 2]) <= DYNAMICS.acceleration * PERIOD, "{found:?}");
             track.send(now, Some([9.0, 2.0]));
         }

@@ -9,11 +9,12 @@ use super::defaults;
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawLimits {
-    /// [m/s]
+    /// [m/s]. It bounds how far a robot is from its last pose: without it no clearance is kept where poses are late or lost.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub speed: Option<f64>,
-    /// [m/s^2]
+    /// [m/s^2]. Robots of the model double-integrator keep it always. The others put clearance, speed and fence first: where
+    /// one comes upon another, or upon an obstacle, too fast, it is exceeded, and the report of a flight says how often.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub acceleration: Option<f64>,
