@@ -3,7 +3,6 @@
 #![cfg(feature = "swarm")]
 
 mod random_flights;
-mod scratch;
 
 use flockform::flock::vectors::{Vectors, distance};
 use flockform::swarm::robots::{DoubleIntegrator, Model, Robot};

@@ -65,7 +65,8 @@
 //!
 //! A pose that disagrees with the model moves the hull, perhaps to where others are. Then one more border parts a member
 //! from each single place of the other's. The other's true place was in its hull before, so that the member is clear of that, and
-//! stays clear of it. A member that does what its model cannot is not covered, nor one that goes on, after a fault, from
+//! stays clear of it. Its velocity is then known only up to what the model could have made of it since the pose before, so
+//! that the ways of some such velocities count too. A member that does what its model cannot is not covered, nor one that goes on, after a fault, from
 //! elsewhere than its targets were meant for, beyond its next pose.
 //!
 //! Of members whose targets are not known (other nodes send them), the last pose counts, by its age: they may be anywhere

@@ -92,13 +92,14 @@ impl Track {
         let expected = self.run(self.robot, pose.stamp, dynamics, period, &mut |_| {});
         let surprise = [0, 1].map(|k| pose.position[k] - expected.position[k]);
         let time = (pose.stamp - since).max(period);
+        let off = distance(pose.position, expected.position);
         // Farther than it can have gone: the pose gives no information on its velocity.
-        if distance(pose.position, expected.position) > 2.0 * dynamics.speed * time + 12.0 * deviation {
+        if off > 2.0 * dynamics.speed * time + 12.0 * deviation {
             return self.restart(pose);
         }
-        let off = distance(pose.position, expected.position);
         let is_surprise = off > SURPRISE * dynamics.acceleration * time * time + NOISE * deviation;
         let most = dynamics.acceleration * time;
+        // The errors before and after the pose add up to what it is off: they may cancel, and a half is left in the end.
         self.doubt = if is_surprise { most.min((2.0 * off / time).max(0.5 * self.doubt)) } else { 0.0 };
         let gains = Gains::of(dynamics.acceleration, period, deviation);
         self.robot = expected;
@@ -127,8 +128,8 @@ impl Track {
         self.sent.push_back((now, target));
     }
 
-    /// Bound on the error of the place at which the robot of [`Track::at`] comes to rest, at three deviations of its
-    /// velocity \[m\].
+    /// Bound on the error of the place at which the robot of [`Track::at`] comes to rest, by its doubt and at three
+    /// deviations of its velocity \[m\].
     pub fn stray(
         &self,
         robot: &Robot,
@@ -139,7 +140,7 @@ impl Track {
     ) -> f64 {
         let speed = robot.velocity[0].hypot(robot.velocity[1]);
         let age = self.stamp.map_or(0.0, |stamp| (now - stamp).max(0.0));
-        3.0 * (speed / dynamics.acceleration + period + age) * gains.velocity_deviation
+        (speed / dynamics.acceleration + period + age) * (3.0 * gains.velocity_deviation + self.doubt)
     }
 
     /// The robot at `now` \[s\] if it follows its targets. Where it is if it stopped following them at some time since its
@@ -158,6 +159,7 @@ impl Track {
             places.extend([[x, y], [x + way[0], y + way[1]]]);
         };
         let found = self.run(self.robot, now, dynamics, period, &mut note);
+        // At such velocities it would be elsewhere by now; at none it has just been let go.
         if self.doubt > 0.0 {
             let [x, y] = self.robot.velocity;
             let by = self.doubt;
@@ -277,6 +279,36 @@ mod tests {
         assert!(place < 2.0 * deviation, "{place}");
         assert!(velocity < 3.0 * gains.velocity_deviation, "{velocity}: {gains:?}");
         assert!(gains.velocity_deviation < 0.2 * deviation / PERIOD, "{gains:?}");
+    }
+
+    #[test]
+    fn a_robot_that_stopped_at_any_time_since_its_last_pose_is_at_one_of_its_places() {
+        for (late, dies) in [0, 3, 7].into_iter().flat_map(|late| (20..60).map(move |dies| (late, dies))) {
+            let (mut robot, mut track) = (Robot::at([0.0; 2], 0.0), Track::default());
+            let (mut poses, mut places) = (Vec::new(), Vec::new());
+            for k in 0..80 {
+                let now = k as f64 * PERIOD;
+                if k < dies {
+                    poses.push(Pose { position: robot.position, yaw: 0.0, stamp: now, frame_is_right: true });
+                }
+                if let Some(pose) = k.checked_sub(late).and_then(|sent| poses.get(sent)) {
+                    track.correct(pose, &DYNAMICS, PERIOD, 0.0);
+                }
+                let found = track.at(now, &DYNAMICS, PERIOD, &mut places).position;
+                let near = |place: &[f64; 2]| distance(*place, robot.position) < 1e-12;
+                assert!(
+                    near(&found) || places.iter().any(near),
+                    "{late} late, dead at {dies}, {k}: {robot:?}"
+                );
+                let target = [2.0 * (0.05 * k as f64).sin(), 1.5 * (0.031 * k as f64).cos()];
+                // It is lost after a while.
+                let target = (k < dies + 10).then_some(target);
+                track.send(now, target);
+                if k < dies {
+                    robot.step(&Model::DoubleIntegrator(DYNAMICS), target.unwrap_or(robot.position), PERIOD);
+                }
+            }
+        }
     }
 
     #[test]
