@@ -378,7 +378,11 @@ pub fn refuse(refusal: &Refusal) -> ExitCode {
         eprintln!("{}", interrupt::NOTHING_KEPT);
         return ExitCode::from(FAILED);
     }
-    if matches!(refusal, Refusal::Ranks(ranks::RanksError::SaidElsewhere)) {
+    if matches!(
+        refusal,
+        Refusal::Ranks(ranks::RanksError::SaidElsewhere)
+            | Refusal::Export(export::ExportError::OnRank { .. })
+    ) {
         // A launcher ends all ranks when one of them fails: the one that speaks fails, and gets to speak.
         return ExitCode::SUCCESS;
     }

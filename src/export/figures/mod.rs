@@ -35,6 +35,7 @@ use std::path::PathBuf;
 use super::OutputFolder;
 use super::error::{ExportError, write_file};
 use crate::engine::Engine;
+use crate::engine::setup::RoleChange;
 use crate::flock::body::Body;
 use crate::flock::neighbourhood::Neighbours;
 use crate::material::cells::Cells;
@@ -62,6 +63,8 @@ pub struct Subject<'a> {
     pub neighbours: Option<&'a Neighbours>,
     /// Between the particles, where the scene has a material.
     pub cells: Option<&'a Cells>,
+    /// Roles that particles take, single components among them.
+    pub changes: &'a [RoleChange],
     /// The unit of the run's clock: `step` or `increment`.
     pub counts: &'static str,
     /// Whether the body was solved for its equilibrium: no steps lead there.
@@ -77,6 +80,7 @@ impl<'a> Subject<'a> {
             body: engine.body(),
             neighbours: engine.lasting_neighbours(),
             cells: engine.cells(),
+            changes: engine.changes(),
             counts: scene.counts(),
             is_solved_at_once: scene.is_solved_at_once(),
         }

@@ -41,14 +41,12 @@ pub enum FilmError {
         reason: String,
     },
     /// A quantity that the subject does not have.
-    #[error("--film-colour {colour}: {reason}\n  help: {} can be shown: {choices}", .of)]
+    #[error("--film-colour {colour}: {reason}\n  help: choose {choices}")]
     Colour {
         /// The quantity asked for.
         colour: &'static str,
         /// Reason for the refusal.
         reason: &'static str,
-        /// Of what others can be shown.
-        of: &'static str,
         /// The others.
         choices: &'static str,
     },
