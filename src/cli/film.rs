@@ -15,7 +15,7 @@ use super::{Refusal, interrupt, print, say};
 #[derive(Debug, Args)]
 pub struct BodyFilmArguments {
     /// Make a film of it as FILE.gif, FILE.mp4 or FILE.webm; the last two take the program ffmpeg
-    #[arg(long, value_name = "FILE", value_parser = film_path)]
+    #[arg(long, value_name = "FILE", value_parser = film_path())]
     film: Option<PathBuf>,
     /// Quantity that colours the film's particles [default: displacement]
     #[arg(long, value_name = "QUANTITY", value_parser = one_of(FilmColour::OF_BODIES), requires = "film")]
@@ -26,7 +26,7 @@ pub struct BodyFilmArguments {
 #[derive(Debug, Args)]
 pub struct SwarmFilmArguments {
     /// Make a film of it as FILE.gif, FILE.mp4 or FILE.webm; the last two take the program ffmpeg
-    #[arg(long, value_name = "FILE", value_parser = film_path)]
+    #[arg(long, value_name = "FILE", value_parser = film_path())]
     film: Option<PathBuf>,
     /// Quantity that colours the film's robots [default: role]
     #[arg(long, value_name = "QUANTITY", value_parser = one_of(FilmColour::OF_SWARMS), requires = "film")]
@@ -40,9 +40,8 @@ fn one_of<const N: usize>(colours: [FilmColour; N]) -> impl TypedValueParser<Val
         .try_map(move |name| named(name).ok_or("no quantity has this name"))
 }
 
-fn film_path(text: &str) -> Result<PathBuf, FilmError> {
-    let path = PathBuf::from(text);
-    FilmFormat::of(&path).map(|_| path)
+fn film_path() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| FilmFormat::of(&path).map(|_| path))
 }
 
 /// A film that will be made.

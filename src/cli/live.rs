@@ -60,7 +60,7 @@ pub fn live(arguments: &LiveArguments) -> Result<ExitCode, Refusal> {
     let server = arguments.page.server()?;
     let recording = arguments.record.open(&about, false, 1)?;
     let door = arguments.page.announce(&server)?;
-    let command = output::command_line(std::env::args().skip(1));
+    let command = output::own_command_line();
     let stop = interrupt::serves();
     let served = server.serve(session, command, folder, stop).map_err(|source| arguments.page.refuse(source));
     close(door);

@@ -30,6 +30,7 @@ mod swarm;
 mod sweep;
 mod trade;
 
+use std::ffi::OsString;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -330,8 +331,7 @@ pub fn arguments() -> Result<(Arguments, RosArguments), Refusal> {
 }
 
 fn read_arguments() -> Result<(Arguments, RosArguments), Refusal> {
-    let all = std::env::args_os().map(|argument| argument.to_string_lossy().into_owned());
-    let all: Vec<String> = all.collect();
+    let all: Vec<OsString> = std::env::args_os().collect();
     let is_asked = all.iter().any(|argument| argument == "--ros-args");
     let split = RosArguments::parse(all.clone(), &|name| std::env::var(name).ok());
     // Only a node is concerned by wrong ROS variables.

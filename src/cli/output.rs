@@ -93,7 +93,7 @@ impl OutputArguments {
     /// The folder asked for, or the first of out/NAME, out/NAME-2, ... that is not taken.
     pub fn folder(&self, name: &str) -> Result<OutputFolder, ExportError> {
         let mut folder = self.empty(name)?;
-        folder.set_command(command_line(std::env::args().skip(1)));
+        folder.set_command(own_command_line());
         Ok(folder)
     }
 
@@ -129,6 +129,11 @@ const WITHOUT_EFFECT: [(&str, bool); 12] = [
     ("--record", true),
     ("--publish", true),
 ];
+
+/// The command that this process was started by, for the reader: as far as it is text.
+pub fn own_command_line() -> String {
+    command_line(std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()))
+}
 
 /// The command with these arguments as a shell takes it, without options that change nothing of its report.
 pub fn command_line(arguments: impl IntoIterator<Item = String>) -> String {
