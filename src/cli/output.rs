@@ -85,11 +85,6 @@ pub fn create(out: &Path, force: bool) -> Result<OutputFolder, ExportError> {
 }
 
 impl OutputArguments {
-    /// The folder, if one is asked for by name.
-    pub fn out(&self) -> Option<&Path> {
-        self.out.as_deref()
-    }
-
     /// The folder asked for, or the first of out/NAME, out/NAME-2, ... that is not taken.
     pub fn folder(&self, name: &str) -> Result<OutputFolder, ExportError> {
         let mut folder = self.empty(name)?;

@@ -182,8 +182,6 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     let shown = arguments.publish.as_ref();
     let open = |name: &String| Positions::open(&Domain::from_environment()?, name, plan.count());
     let shown = shown.map(open).transpose()?;
-    let required = |colour| film::run::require_colour(&scene, colour);
-    let film = arguments.film.open(&arguments.output, required)?;
     let folder = others.is_none().then(|| match &left {
         Some(left) => left.open(),
         None => arguments.output.folder(&scene.name),
@@ -193,6 +191,9 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
         // A resumed run is described by how it began.
         folder.set_command(command_line(asked.arguments()));
     }
+    let required = |colour| film::run::require_colour(&scene, colour);
+    let force = arguments.output.force;
+    let film = arguments.film.open(folder.as_ref(), force, required)?;
     let setup = start.elapsed();
     let (own, total) = (plan.setup.body.owned().len(), plan.setup.body.total());
     tracing::info!("planned {own} of {total} particles of `{}` in {setup:.1?}", scene.name);
@@ -201,7 +202,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     let outputs = (arguments.outputs(), film.is_some());
     let recorder = Recorder::new(&scene, &plan, folder.as_ref(), left.as_ref(), outputs)?;
     let about = About { source: "run", name: scene.name.clone(), ..About::default() };
-    let recording = arguments.record.open(&about, arguments.output.force, 1)?;
+    let recording = arguments.record.open_beside(folder.as_ref(), &about, force)?;
     let messages = recording.as_ref().map(|one| BodyMessages::new(&scene, one.sink())).transpose()?;
     let quiet = arguments.output.quiet || folder.is_none();
     let mut observer = RunObserver {
