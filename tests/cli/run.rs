@@ -198,7 +198,22 @@ fn a_trade_study_prints_what_is_cheapest_and_writes_every_setting() {
     assert_eq!(table.lines().count() - 1, study["points"].as_array().expect("points").len());
     assert!(table.lines().any(|line| line.starts_with("material,0.5,") && line.contains(",multigrid,")));
     assert!(here.join("trade.png").is_file() && here.join("trade.svg").is_file());
-    run_in(folder.path(), &["trade", "grips", "--quick", "--out", "here", "--force", "--quiet"]);
+    let again = ["trade", "grips", "--quick", "--out", "here", "--force", "--quiet"];
+    run_in(folder.path(), &[&again[..], &["--repeats", "2", "--max-particles", "600"]].concat());
+    let smaller = json_in(&here.join("trade.json"));
+    let particles = |study: &serde_json::Value| {
+        let points = study["points"].as_array().expect("points").iter();
+        points.filter_map(|point| point["particles"].as_u64()).max().expect("some")
+    };
+    assert_eq!([&study["repeats"], &smaller["repeats"]], [1, 2]);
+    assert!(
+        particles(&study) > 600 && particles(&smaller) <= 600,
+        "{} {}",
+        particles(&study),
+        particles(&smaller)
+    );
+    let none = ["trade", "grips", "--quick", "--out", "none", "--max-particles", "1"];
+    refused(&none, &["no setting is left", "--max-particles"]);
 }
 
 #[test]
