@@ -125,6 +125,29 @@ fn a_body_beyond_the_memory_that_is_there_is_refused_with_both_numbers() {
     assert!(small.status.success(), "{}", text(&small.stderr));
 }
 
+/// 20,000 points in one place see 4e8 others: 1.6 GB of lists, which are counted before there are any.
+#[test]
+fn points_whose_lists_are_beyond_the_memory_that_is_there_are_refused_as_a_body_is() {
+    let folder = temporary();
+    let places =
+        (0..20_000).map(|k| format!("{:e},{:e}\n", 1e-10 * f64::from(k % 200), 1e-10 * f64::from(k / 200)));
+    std::fs::write(folder.path().join("heap.csv"), "x,y\n".to_owned() + &places.collect::<String>())
+        .expect("written");
+    let scene = "title = \"heap\"\nbody = { shape = { kind = \"points\", file = \"heap.csv\" } }\n\
+                 neighbours = { kind = \"within\", radius = 1.5 }\nstop = { steps = 1 }\n";
+    std::fs::write(folder.path().join("heap.toml"), scene).expect("written");
+    let program = command(&[], folder.path()).get_program().to_string_lossy().into_owned();
+    for words in ["run heap.toml --out o", "plan heap.toml"] {
+        let run = format!("ulimit -v 1500000; exec '{program}' {words}");
+        let output =
+            Command::new("sh").args(["-c", &run]).current_dir(folder.path()).output().expect("sh starts");
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{words}: {said}");
+        assert!(said.contains("GiB of memory or more") && said.contains("`ulimit -v`"), "{words}: {said}");
+    }
+    assert_eq!(names_in(folder.path()), ["heap.csv", "heap.toml"]);
+}
+
 #[cfg(unix)]
 #[test]
 fn names_that_are_not_utf_8_are_taken_as_they_are_or_refused_in_words() {
