@@ -25,7 +25,7 @@ use flockform::export::{Drawing, Results, Signed, Timings, write_all};
 use flockform::ranks::Team;
 use flockform::record::About;
 use flockform::record::body::BodyMessages;
-use flockform::scene::{LoadSteps, Scene};
+use flockform::scene::Scene;
 use flockform::shm::Domain;
 use flockform::shm::positions::Positions;
 use flockform::solve::interrupt::Interrupt;
@@ -210,7 +210,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
         looks: Looks::new(&plan, shown.is_some() || messages.is_some()),
         shown,
         messages,
-        progress: Progress::of_steps(quiet, steps_of(&scene)),
+        progress: Progress::of_steps(quiet, scene.most_steps()),
         checkpointer: Checkpointer::new(&arguments.checkpoints, (asked, &scene, digest), left.as_ref()),
         interrupted: if folder.is_some() { interrupt::keeps() } else { interrupt::serves() },
         folder,
@@ -326,14 +326,6 @@ impl RunArguments {
                 RunRequest { scene: in_full(scene), set, force }
             }
         }
-    }
-}
-
-/// Steps, or increments, that a run takes at most.
-fn steps_of(scene: &Scene) -> usize {
-    match &scene.load_steps {
-        Some(LoadSteps::Solved(parts)) => parts.len(),
-        _ => scene.stop.steps,
     }
 }
 

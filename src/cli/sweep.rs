@@ -250,6 +250,7 @@ fn sweep_here(arguments: &SweepArguments) -> Result<ExitCode, Refusal> {
     let scene = scene_arguments(sweep.request());
     let runs = Runs { scene: &scene, design: &sweep.design, outputs: &outputs };
 
+    runs.require_reached()?;
     let mut pending = sweep.pending();
     // A misspelt key or output is found before a folder is made.
     let first = if found.is_none() && !pending.is_empty() { runs.first(&pending)? } else { Vec::new() };

@@ -432,6 +432,33 @@ fn a_plan_says_what_is_modelled_left_out_and_why() {
 }
 
 #[test]
+fn what_comes_after_the_last_step_is_warned_of_by_the_plan_and_the_run() {
+    let folder = temporary();
+    let set = [
+        "stop.steps=25",
+        "roles[1].from=99999",
+        "record.figures=[2, 25, 26, 100000]",
+        "actions=[{ at = 3, what = { kind = \"cut\", from = [0, 0], to = [1, 1] } },\
+         { at = 2000, what = { kind = \"cut\", from = [0, 0], to = [1, 1] } }]",
+    ];
+    let set: Vec<&str> = set.iter().flat_map(|text| ["--set", *text]).collect();
+    let words = "caution: beyond the last step, 25, and without effect: roles[1].from = 99999, actions[1].at = 2000, \
+                 record.figures[2] = 26, record.figures[3] = 100000; lower them, or raise stop.steps\n";
+    for command in
+        [&["plan", "tension"][..], &["run", "tension", "--no-report", "--figures", "none", "--out", "o"]]
+    {
+        let said = run_in(folder.path(), &[command, &set].concat());
+        assert!(said.contains(words), "{said}");
+    }
+    let parts = ["--set", "load_steps={ increments = 4 }", "--set", "record.figures=[4, 5]"];
+    let said = run_in(folder.path(), &[&["plan", "elastica"][..], &parts].concat());
+    assert!(
+        said.contains("beyond the last increment, 4, and without effect: record.figures[1] = 5;"),
+        "{said}"
+    );
+}
+
+#[test]
 fn the_schema_is_json_and_knows_every_top_level_key() {
     let schema = json(&run_in(temporary().path(), &["schema"]));
     for key in
