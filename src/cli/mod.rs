@@ -116,7 +116,7 @@ pub enum Command {
     /// Replays a recorded flight and lists where today's targets differ from the recorded ones
     #[command(
         after_help = "Examples:\n  flockform swarm gap --record gap.mcap\n  flockform replay gap.mcap\n  flockform replay gap.mcap --set limits.speed=0.5 --tolerance 0.01\n\n\
-                      Exit codes: 0 no target is farther off than the tolerance, 1 some are, 2 bad input."
+                      Exit codes: 0 no target is farther off than the tolerance, 1 some are or the recording breaks off, 2 bad input."
     )]
     Replay(replay::ReplayArguments),
     /// Keeps a swarm in formation over ROS 2 or shared memory: poses in, safe targets out
