@@ -100,7 +100,12 @@ impl OutputArguments {
         for n in 2.. {
             // Making it decides: another run may want the same name at this moment.
             match create(&path, false) {
-                Err(ExportError::NotEmpty(_) | ExportError::Unfinished(_) | ExportError::Busy(_)) => {}
+                Err(
+                    ExportError::NotEmpty(_)
+                    | ExportError::Unfinished(_)
+                    | ExportError::InTheWay(_)
+                    | ExportError::Busy(_),
+                ) => {}
                 created => return created,
             }
             path.set_file_name(format!("{name}-{n}"));

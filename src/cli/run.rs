@@ -199,6 +199,13 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     tracing::info!("planned {own} of {total} particles of `{}` in {setup:.1?}", scene.name);
     tracing::info!("{}", flockform::sweep::chosen_here());
 
+    let undrawn = left.as_ref().map_or_else(Vec::new, |left| left.undrawn(&scene));
+    if arguments.outputs().draws() && !undrawn.is_empty() && !arguments.output.quiet {
+        eprintln!(
+            "caution: no figures were asked for until now: there are none of steps {}",
+            undrawn.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
+        );
+    }
     let outputs = (arguments.outputs(), film.is_some());
     let recorder = Recorder::new(&scene, &plan, folder.as_ref(), left.as_ref(), outputs)?;
     let about = About { source: "run", name: scene.name.clone(), ..About::default() };

@@ -40,6 +40,9 @@ pub enum ExportError {
         .0.display(), .0.display(), command = resumed_by(.0)
     )]
     Unfinished(PathBuf),
+    /// Something else where an unfinished run would be kept.
+    #[error("{} is in the way of what is kept of a run that is broken off: move it away, or give another --out", .0.display())]
+    InTheWay(PathBuf),
     /// Another program is writing the same outputs.
     #[error("{} is being written by another flockform that still runs: wait for it, or give another --out", .0.display())]
     Busy(PathBuf),

@@ -241,10 +241,13 @@ fn require_free(out: &Path, force: bool) -> Result<(), ExportError> {
     make_way(&unfinished(out), force)
 }
 
-/// Discards a run that was killed, where that is asked for.
+/// Discards a run that was killed, where that is asked for; what else is in its place is nobody's to discard.
 fn make_way(unfinished: &Path, force: bool) -> Result<(), ExportError> {
-    if ![checkpoint::FILE, sweep::REQUEST].iter().any(|file| unfinished.join(file).exists()) {
+    if unfinished.symlink_metadata().is_err() {
         return Ok(());
+    }
+    if ![checkpoint::FILE, sweep::REQUEST].iter().any(|file| unfinished.join(file).exists()) {
+        return Err(ExportError::InTheWay(unfinished.to_owned()));
     }
     if !force {
         return Err(ExportError::Unfinished(unfinished.to_owned()));
