@@ -18,10 +18,12 @@ use crate::solve::equilibrium::{
 
 /// Fewest bytes that a run of a scene takes, known before anything is laid out; 0 where its layout is refused anyway.
 pub fn at_least(scene: &Scene) -> f64 {
-    let BodySource::Cut(cut) = &scene.body else { return 0.0 };
-    let particles = match cut {
-        Cut::Count { columns, rows } => f64::from(*columns) * f64::from(*rows),
-        Cut::Shape(shape) => {
+    let particles = match &scene.body {
+        BodySource::Points(cloud) => {
+            return (cloud.ids.len() * EACH) as f64 + 4.0 * cloud.entries as f64;
+        }
+        BodySource::Cut(Cut::Count { columns, rows }) => f64::from(*columns) * f64::from(*rows),
+        BodySource::Cut(Cut::Shape(shape)) => {
             Outline::of_shape(shape).map_or(0.0, |outline| outline.area() / scene.lattice.cell_area())
         }
     };

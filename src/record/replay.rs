@@ -72,9 +72,14 @@ impl RobotDifference {
 }
 
 impl Report {
-    /// Whether no target is farther off than the tolerance, and none is missing.
+    /// Whether no target is farther off than the tolerance, and none is missing; of a file that breaks off, as far as it goes.
     pub fn holds(&self) -> bool {
         self.robots.iter().all(RobotDifference::holds)
+    }
+
+    /// Whether all that was recorded has been read: a file that breaks off may have had more.
+    pub fn is_whole(&self) -> bool {
+        self.damage.is_none()
     }
 
     /// The largest difference of all \[m\].
@@ -89,7 +94,8 @@ impl Report {
 /// A recording without a swarm; what the overrides make of it.
 pub fn recorded_swarm(reader: &Reader, set: &[String]) -> Result<Swarm, RecordError> {
     let described = reader.described()?;
-    let text = described.swarm.ok_or_else(|| RecordError::NoSwarm(reader.path().to_owned()))?;
+    let nameless = || RecordError::NoSwarm(reader.path().to_owned());
+    let text = described.swarm.ok_or_else(nameless).map_err(|error| reader.after_damage(error))?;
     let of = |key: &str| described.metadata.get(key).cloned();
     let given: Vec<String> = of("set").and_then(|set| serde_json::from_str(&set).ok()).unwrap_or_default();
     let (name, folder) = (of("name").unwrap_or_default(), of("folder").map(PathBuf::from));
@@ -111,7 +117,7 @@ pub fn replay(reader: &Reader, swarm: &Swarm, tolerance: f64) -> Result<Report, 
     }
     let unusable = |what: &str, help: &str| {
         let (path, what, help) = (reader.path().to_owned(), what.to_owned(), help.to_owned());
-        Err(RecordError::Unusable { path, what, help })
+        Err(reader.after_damage(RecordError::Unusable { path, what, help }))
     };
     if let Some(refusal) = replay.refusal {
         return unusable(&refusal, "give the swarm file that was flown with --swarm");

@@ -20,12 +20,6 @@ pub enum FilmError {
     /// A folder that does not exist.
     #[error("there is no folder {} for the film\n  help: make it, or give --film another place", .0.display())]
     NoFolder(PathBuf),
-    /// A place inside the folder of results, which appears only at the end.
-    #[error(
-        "the film would stand in {}, which is for the results alone\n  help: give --film a place outside it",
-        .0.display()
-    )]
-    InResults(PathBuf),
     /// Another program makes the same film.
     #[error("{} is being made by another flockform that still runs: give --film another name", .0.display())]
     Busy(PathBuf),
