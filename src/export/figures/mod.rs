@@ -2,7 +2,7 @@
 //!
 //! [`configuration()`]: the body at a step, in the paper's colours. [`pe1`]: filled contours of the first
 //! pseudo-energy over it. [`stress()`] and [`components()`]: the von Mises stress of its cells, and
-//! the components of their stress. [`probes`]: the history of a few particles. [`overlay`] and [`von_mises()`]: what a
+//! the components of their stress. [`probes()`]: the history of a few particles. [`overlay`] and [`von_mises()`]: what a
 //! rule makes of a body beside the truth. Axes of bodies are equal, and every axis carries its unit. SVG is
 //! written directly: a figure here is circles, lines and paths, and what matters is where they go.
 
@@ -14,14 +14,13 @@ mod comparison;
 pub(super) mod components;
 pub(super) mod configuration;
 mod energy;
-mod faces;
 #[cfg(feature = "swarm")]
 pub(crate) mod flight_map;
 pub(super) mod heading;
-mod history;
 pub(super) mod page;
 pub(super) mod panels;
 pub(super) mod png;
+pub(super) mod probes;
 mod raster;
 mod stress;
 mod svg;
@@ -45,7 +44,7 @@ pub use comparison::{Pair, overlay};
 pub use components::components;
 pub use configuration::configuration;
 pub use energy::pe1;
-pub use history::probes;
+pub use probes::probes;
 pub use stress::stress;
 pub use svg::INK;
 pub use von_mises::von_mises;
