@@ -108,13 +108,16 @@ impl FormationNode {
         let names = names(arguments, member)?;
         let edge = network::join(arguments)?;
         let node = edge.named_node(&names)?;
+        let raw = &swarm.raw.node;
+        let stop_topic = raw.commands.may_stop().then(|| names.fleet_topic(&raw.emergency_stop_topic));
+        let stop_topic = stop_topic.transpose()?;
+        stop_topic.iter().for_each(|topic| node.keep_for_commands(topic));
 
         let is_configured = Arc::default();
         let (settings, store) = settings::declare(&control, arguments, &names, swarm, &part, &is_configured)?;
         check_commands(swarm, settings.autostart)?;
         let clock = if settings.use_sim_time { Clock::simulated(&node)? } else { Clock::system() };
         let service = |leaf: &str| names.service(&format!("~/{leaf}")).map_err(NodeError::from);
-        let raw = &swarm.raw.node;
         control.set_active(false);
         let mut this = Self {
             pace: Pace::new(settings.rate),
@@ -124,11 +127,7 @@ impl FormationNode {
                 [RawService::Lifecycle, RawService::TransitionEvents].map(|kind| raw.serves(kind)),
             )?,
             stop: node.service(&service("emergency_stop")?)?,
-            stop_requests: raw
-                .commands
-                .may_stop()
-                .then(|| names.fleet_topic(&raw.emergency_stop_topic).map_err(NodeError::from))
-                .transpose()?
+            stop_requests: stop_topic
                 .map(|topic| node.subscription(&topic, Quality::reliable(1)))
                 .transpose()?,
             resume: node.service(&service("resume")?)?,
@@ -244,8 +243,8 @@ impl FormationNode {
             self.statistics.missed += missed;
             self.tick();
             if let Some(pulse) = &self.pulse {
-                match self.endpoints {
-                    Some(_) => pulse.note_peers(self.hears_any()),
+                match &self.endpoints {
+                    Some(endpoints) => pulse.note_peers(self.hears_any(), || endpoints.link.left()),
                     None => pulse.listens_to_none(),
                 }
             }
