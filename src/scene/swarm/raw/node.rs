@@ -23,6 +23,9 @@ pub struct RawNode {
     /// Topic of each robot's pose, or of the array of all.
     #[serde(default = "defaults::pose_topic")]
     pub pose_topic: String,
+    /// Robots whose poses the node of one robot (`--member`) receives.
+    #[serde(default)]
+    pub hears: RawHears,
     /// The message type of targets.
     #[serde(default)]
     pub target_type: RawTargetType,
@@ -64,6 +67,7 @@ impl Default for RawNode {
             frame_prefix: None,
             pose_type: RawPoseType::default(),
             pose_topic: defaults::pose_topic(),
+            hears: RawHears::default(),
             target_type: RawTargetType::default(),
             target_topic: defaults::target_topic(),
             leader_topic: defaults::leader_topic(),
@@ -164,6 +168,17 @@ pub enum RawPoseType {
     Odometry,
     /// One `geometry_msgs/PoseArray` for all, in the order of the robots, on `pose_topic`, which then is `poses` unless given.
     PoseArray,
+}
+
+/// Robots whose poses the node of one robot receives.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawHears {
+    /// All where `limits.clearance` is given, for any of them may come near; otherwise the neighbours.
+    #[default]
+    All,
+    /// The robots that its own follows: from others it keeps no distance.
+    Neighbours,
 }
 
 /// Message that carries targets.
