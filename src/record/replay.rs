@@ -21,7 +21,7 @@ use crate::messages::names::Names;
 use crate::messages::recorder::{parameters, set_parameter};
 use crate::messages::std_msgs::Header;
 use crate::scene::swarm::Swarm;
-use crate::swarm::control::{Control, Mode};
+use crate::swarm::control::{Control, Mode, scope};
 use crate::swarm::flight::{FlightCommand, commands};
 use crate::swarm::watch::Range;
 
@@ -185,12 +185,7 @@ impl Replay {
         };
         let count = control.formation().count();
         let member = described.metadata.get("member").and_then(|name| control.formation().number(name));
-        let mut heard_of: Vec<usize> = (0..count).collect();
-        if let Some(m) = member {
-            heard_of = control.formation().depends_on(m);
-            heard_of.push(m);
-            heard_of.sort_unstable();
-        }
+        let heard_of = member.map_or((0..count).collect(), |m| scope::heard(swarm, &control, m));
         control.listen_to(&heard_of);
         control.set_active(false);
         let fleet = described.metadata.get("namespace").map_or("/", String::as_str);

@@ -189,14 +189,15 @@ pub struct RawBounds {
     /// Largest distance of a robot from where the leaders' affine motion has its place, ever [m].
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub affine_error: Option<f64>,
-    /// The same at the end, or the distance from where the rule comes to rest if there is no affine motion [m].
+    /// The same at the end, or the distance from where the rule comes to rest if there is no affine motion [m]. A flight
+    /// that ends before the leaders' programs does not keep it.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub final_error: Option<f64>,
     /// Smallest free space between two rims, or a rim and an obstacle, ever [m].
     #[schemars(range(min = 0))]
     pub clearance: Option<f64>,
     /// Time after which the formation stays within `settled_within` of its shape, counted from the end of the
-    /// leaders' programs [s].
+    /// leaders' programs [s], before which no flight keeps it.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub settling_time: Option<f64>,
     /// [m]

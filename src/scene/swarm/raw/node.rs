@@ -17,6 +17,8 @@ pub struct RawNode {
     pub pose_type: RawPoseType,
     /// Topic of each robot's pose, or of the array of all.
     pub pose_topic: String,
+    /// Robots whose poses the node of one robot (`--member`) receives.
+    pub hears: RawHears,
     /// The message type of targets.
     pub target_type: RawTargetType,
     /// Topic of each robot's target, or of the array of all.
@@ -48,6 +50,7 @@ impl Default for RawNode {
             frame_prefix: None,
             pose_type: RawPoseType::default(),
             pose_topic: "{name}/pose".into(),
+            hears: RawHears::default(),
             target_type: RawTargetType::default(),
             target_topic: "{name}/target_pose".into(),
             leader_topic: "{name}/leader_pose".into(),
@@ -149,6 +152,17 @@ pub enum RawPoseType {
     Odometry,
     /// One `geometry_msgs/PoseArray` for all, in the order of the robots, on `pose_topic`, which then is `poses` unless given.
     PoseArray,
+}
+
+/// Robots whose poses the node of one robot receives.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawHears {
+    /// All where `limits.clearance` is given, for any of them may come near; otherwise the neighbours.
+    #[default]
+    All,
+    /// The robots that its own follows: from others it keeps no distance.
+    Neighbours,
 }
 
 /// Message that carries targets.
