@@ -296,6 +296,19 @@ fn check_flight(raw: &RawSwarm, refuse: Refuse<'_>) -> Result<(), SceneError> {
         let message = "this model of a robot needs a limit".into();
         return Err(refuse(key, message, "give it, or use flight.model = { kind = \"ideal\" }"));
     }
+    let late = [
+        ("flight.delay", raw.flight.delay > 0),
+        ("flight.jitter", raw.flight.jitter > 0),
+        ("flight.loss", raw.flight.loss > 0.0),
+    ];
+    let late = late.into_iter().find(|(_, is_late)| *is_late).filter(|_| speed.is_none());
+    if let Some((key, _)) = late.filter(|_| raw.limits.clearance.is_some()) {
+        let message = format!(
+            "cannot be kept: by {key} poses come late or not at all, and without limits.speed a robot may be anywhere by then"
+        );
+        let help = format!("give limits.speed, above what the programs ask for, or leave out {key}");
+        return Err(refuse("limits.clearance", message, &help));
+    }
     let starts: Vec<&String> = raw.flight.start.iter().map(|start| &start.robot).collect();
     if let Some(n) = repeated(&starts) {
         let message = format!("`{}` has a place to start at already", starts[n]);
