@@ -182,7 +182,7 @@ pub(super) const SEVERAL: &str = "loads=[{kind=\"pressure\",region={kind=\"outli
 #[test]
 fn a_table_has_its_header_where_the_first_rank_has_no_particle() {
     let text = "title=\"column\"\nlattice={kind=\"square\",spacing=1.0}\nbody={shape={kind=\"grid\",columns=1,rows=24}}\n\
-        stop={steps=8}\nroles=[{region={kind=\"edge\",side=\"bottom\"},role=\"clamped\"},\
+        stop={steps=8}\nrecord={vtk_every=4}\nroles=[{region={kind=\"edge\",side=\"bottom\"},role=\"clamped\"},\
         {region={kind=\"edge\",side=\"top\"},role=\"leader\",motion={kind=\"velocity\",per_step=[0.0,0.01]}}]";
     let [_, table, _] = assert_tables_the_same(&plate(text, &[]));
     assert!(table.starts_with("id,column,row,role,X,Y,") && table.lines().count() == 25, "{table}");
