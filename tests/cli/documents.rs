@@ -115,7 +115,7 @@ fn the_command_lines_of_the_guide_to_swarms_end_as_it_says() {
         if !is_quick || line.contains("FILE") {
             continue;
         }
-        let shell = line.replacen("flockform", &concat!("'", env!("CARGO_BIN_EXE_flockform"), "'"), 1);
+        let shell = line.replacen("flockform", concat!("'", env!("CARGO_BIN_EXE_flockform"), "'"), 1);
         let output =
             std::process::Command::new("sh").args(["-c", &shell]).current_dir(folder.path()).output();
         let output = output.expect("a shell");

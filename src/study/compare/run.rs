@@ -180,8 +180,7 @@ fn cautions(scene: &Scene, truth: &Reference, effort: &Effort) -> Vec<String> {
         )
     });
     let own = truth.error().displacement;
-    // NaN and infinity are not as asked for either.
-    let missed = (!(own <= effort.target)).then(|| {
+    let missed = (own.is_nan() || own > effort.target).then(|| {
         format!(
             "the truth's own error is not known to be below the {:.2e} % asked for, on {} nodes; where single points hold or push              a body no mesh is fine enough",
             100.0 * effort.target,
