@@ -322,7 +322,7 @@ mod tests {
             watch.receive(4, pose(claims, now), now)
         };
         // Farther off than it can go while ranges are remembered.
-        let lie = [2.0, 3.6];
+        let lie = [2.0, 5.0];
         assert_eq!(send(&mut watch, 0.0, PLACES[4], &[0, 1, 2, 3]), Ok(()));
         assert!(matches!(
             send(&mut watch, 0.1, lie, &[0, 1, 2, 3]),
