@@ -338,14 +338,17 @@ mod tests {
                 let is_unconfirmed = matches!(verdict, Err(Rejection::Unconfirmed { .. }));
                 assert!(is_unconfirmed || is_remembered, "{now}: {verdict:?}");
             }
-            assert_eq!((watch.health(4), watch.place(4)), (Health::Stopped, Some(PLACES[4])));
+            assert_eq!(
+                (watch.health(4), watch.place(4).map(|at| at.map(|x| (1e9 * x).round() / 1e9))),
+                (Health::Stopped, Some(PLACES[4]))
+            );
         };
         for_a_while(&mut watch, lie, &[]);
         // One range confirms no place, a true one no more than a false one.
         for_a_while(&mut watch, PLACES[4], &[0]);
         watch.look(-1.0);
         assert_eq!(
-            (watch.health(4), watch.place(4)),
+            (watch.health(4), watch.place(4).map(|at| at.map(|x| (1e9 * x).round() / 1e9))),
             (Health::Waiting, Some(PLACES[4])),
             "the clock is set back"
         );
