@@ -17,7 +17,7 @@ const TEXT: f64 = 12.0;
 const TICK: f64 = 5.0;
 const GRID: &str = "#e6e8eb";
 
-/// Points of a line that a page can show; a longer one keeps the extremes of each stretch.
+/// Points of a line that a page or a sheet can show; a longer one keeps the extremes of each stretch.
 const MOST_POINTS: usize = 1500;
 
 /// The quantity of an axis, and its scale.
@@ -311,7 +311,7 @@ fn draw_series(svg: &mut Svg, chart: &Chart, axes: &Axes, series: &Series) {
         series.points.iter().filter_map(|&p| on_axes(chart, p)).map(|p| axes.place(p)).collect();
     if matches!(series.style, Style::Line | Style::Front) {
         let mut path = Path::default();
-        path.polyline(page::thinned(&places));
+        path.polyline(thinned(&places));
         let width = if series.style == Style::Line { 1.7 } else { 1.0 };
         let stroke =
             format!("stroke=\"{}\" stroke-width=\"{width}\" stroke-linejoin=\"round\"", series.colour);

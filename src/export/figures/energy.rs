@@ -1,23 +1,20 @@
 //! PE1 as filled contours over the deformed body.
 
-use std::borrow::Cow;
-use std::collections::HashSet;
-
 use super::axes::Axes;
 use super::bands::{Bands, Sample, at_least, triangles};
 use super::configuration::dot_radius;
+use super::faces::faces;
 use super::heading::Heading;
 use super::page;
 use super::svg::{Path, Svg};
 use super::{MOST_DOTS, Subject};
 use crate::continuum::record::Snapshot;
-use crate::material::cells::Cells;
 
 /// PE1 comes from differences of positions, whose last digits are rounding: what is below the
 /// square of this many spacings is no deformation.
 const NOISE_IN_SPACINGS: f64 = 1e-10;
 
-/// Filled contours over the cells of the lattice; particles in no whole cell, and bodies whose
+/// Filled contours over the faces of the lattice; particles in no whole face, and bodies whose
 /// neighbours are no function of the lattice, as dots in the colours of the same bands. Frame and
 /// ghosts, which are no matter, are left out.
 pub fn pe1(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
@@ -62,13 +59,16 @@ pub(super) fn draw_contours(
     let mut is_alone = is_drawn.to_vec();
     let sample = |&i: &u32| (axes.place(snapshot.positions.get(i as usize)), values[i as usize]);
     let mut patches: Vec<Vec<Sample>> = Vec::new();
-    // Where neighbours are found anew at every step the cells of the lattice mean nothing.
-    let of_lattice = || subject.neighbours.map(|_| Cow::Owned(Cells::of_body(subject.body)));
-    if let Some(cells) = subject.cells.map(Cow::Borrowed).or_else(of_lattice) {
-        for cell in whole(&cells, is_drawn, &snapshot.broken) {
-            cell.iter().for_each(|&corner| is_alone[corner as usize] = false);
-            patches.push(cell.iter().map(sample).collect());
-        }
+    // Where neighbours are found anew at every step the faces of the lattice mean nothing.
+    let faces = match (subject.cells, subject.neighbours) {
+        // Along an outline that was kept cells have other shapes.
+        (Some(cells), _) if subject.body.outline.is_some() => cells.iter().map(<[u32]>::to_vec).collect(),
+        (_, Some(_)) => faces(subject.body, is_drawn, &snapshot.broken),
+        _ => Vec::new(),
+    };
+    for face in faces {
+        face.iter().for_each(|&corner| is_alone[corner as usize] = false);
+        patches.push(face.iter().map(sample).collect());
     }
     draw_bands(svg, &patches, bands);
     let radius = dot_radius(axes, subject.body.lattice.spacing());
@@ -76,15 +76,6 @@ pub(super) fn draw_contours(
         let attributes = format!("fill=\"{}\"", bands.colour(bands.of(values[i])));
         svg.group(attributes, |svg| svg.circle(axes.place(snapshot.positions.get(i)), radius));
     }
-}
-
-/// Cells whose corners are all drawn and no two of whose corners are a broken pair.
-fn whole<'a>(cells: &'a Cells, is_drawn: &'a [bool], broken: &[[u32; 2]]) -> impl Iterator<Item = &'a [u32]> {
-    let broken: HashSet<[u32; 2]> = broken.iter().copied().collect();
-    cells.iter().filter(move |cell| {
-        let is_broken = |&a: &u32| cell.iter().any(|&b| broken.contains(&[a, b]));
-        cell.iter().all(|corner| is_drawn[*corner as usize] && !is_broken(corner))
-    })
 }
 
 /// Filled contours over patches, each with the field at its corners.
@@ -114,24 +105,4 @@ fn superlevel(patches: &[Vec<Sample>], level: Option<f64>) -> Path {
         }
     }
     path
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::flock::body::{Body, Cut};
-    use crate::flock::lattice::{Lattice, LatticeKind};
-    use crate::flock::neighbourhood::Neighbourhood;
-
-    #[test]
-    fn cells_are_left_out_when_broken_or_incomplete() {
-        let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0; 2], 0.4);
-        let (cut, neighbourhood) = (Cut::Count { columns: 7, rows: 7 }, Neighbourhood::First { keep: None });
-        let (body, _) = Body::build(lattice, &cut, &neighbourhood, None).expect("a body");
-        let (cells, mut is_drawn) = (Cells::of_body(&body), vec![true; 49]);
-        assert_eq!(whole(&cells, &is_drawn, &[]).count(), 36);
-        assert_eq!(whole(&cells, &is_drawn, &[[8, 9]]).count(), 34);
-        is_drawn[0] = false;
-        assert_eq!(whole(&cells, &is_drawn, &[]).count(), 35);
-    }
 }

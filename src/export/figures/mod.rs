@@ -14,6 +14,7 @@ mod comparison;
 pub(super) mod components;
 pub(super) mod configuration;
 mod energy;
+mod faces;
 #[cfg(feature = "swarm")]
 pub(crate) mod flight_map;
 pub(super) mod heading;

@@ -159,7 +159,7 @@ impl SwarmPlan {
             neighbours: neighbours(formation),
             spacing: formation.spacing(),
             free_space: free_space(formation),
-            model: model(&raw.flight.model),
+            model: flight.fleet().model().name(),
             period_s: period,
             sweeps: raw.control.sweeps,
             flight_s: flight.periods() as f64 * period,
@@ -183,15 +183,6 @@ impl SwarmPlan {
         };
         plan.cautions = lasting(&plan).into_iter().chain(cautions::of(swarm, &flight)).collect();
         Ok(plan)
-    }
-}
-
-fn model(model: &RawModel) -> &'static str {
-    match model {
-        RawModel::Ideal => "ideal",
-        RawModel::Integrator => "integrator",
-        RawModel::Unicycle { .. } => "unicycle",
-        RawModel::DoubleIntegrator => "double-integrator",
     }
 }
 
