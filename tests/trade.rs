@@ -163,6 +163,10 @@ fn singles_are_taken_where_the_accuracy_allows_them_and_the_rule_where_it_is_ope
     assert_eq!([precision("1%"), precision("0.1%")], [Precision::F32, Precision::F64]);
 }
 
+const PUSHED: &str =
+    "loads=[{ kind = \"force\", region = { kind = \"edge\", side = \"right\" }, force = [0.0, -0.1] }]";
+const DISC: &str = "body.shape={ kind = \"disc\", centre = [0.0, 0.0], radius = 10.0 }";
+
 #[test]
 fn an_accuracy_that_cannot_be_had_is_refused_with_the_reason() {
     let refused = |name: &str, overrides: &[&str], accuracy: &str| {
@@ -175,6 +179,11 @@ fn an_accuracy_that_cannot_be_had_is_refused_with_the_reason() {
         (refused("grips", &[], "much"), "more than 0 and less than 1"),
         (refused("lattice-square", &[], "1%"), "the scene has none"),
         (refused("beam-loaded", &["record.probes=[3]"], "1%"), "these ids are other particles"),
+        (refused("beam-loaded", &[PUSHED], "1%"), "in which it pushes more particles"),
+        (
+            refused("beam-loaded", &[DISC, "lattice.spacing=2.0"], "0.5%"),
+            "less of a curved side is outermost",
+        ),
         (refused("beam-loaded", &["lattice.spacing=2.75"], "0.0001"), "after 5 halvings of the spacing"),
     ] {
         assert!(message.contains(words) && message.contains("help: "), "{message}");

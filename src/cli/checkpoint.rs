@@ -103,6 +103,13 @@ impl ResumedRun {
         self.checkpoint.join(&self.folder, &plan.setup)
     }
 
+    /// Steps whose configurations are to be drawn and were not kept, as no figures were asked for then.
+    pub fn undrawn(&self, scene: &Scene) -> Vec<usize> {
+        let (step, kept) = (self.checkpoint.engine.step(), &self.checkpoint.snapshots);
+        let is_missing = |figure: &usize| *figure <= step && kept.iter().all(|one| one.step != *figure);
+        scene.record.figures.iter().copied().filter(is_missing).collect()
+    }
+
     /// The folder to go on filling.
     pub fn open(&self) -> Result<OutputFolder, ExportError> {
         if self.folder == self.out {

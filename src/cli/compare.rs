@@ -85,5 +85,5 @@ fn words(scene: &Scene, compared: &Compared) -> String {
     for place in &compared.places {
         words += &place.to_string();
     }
-    words
+    words + &compared.cautions.iter().map(|caution| format!("caution: {caution}\n")).collect::<String>()
 }

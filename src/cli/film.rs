@@ -4,7 +4,8 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{PathBufValueParser, PossibleValuesParser, TypedValueParser};
+use flockform::export::OutputFolder;
 use flockform::export::film::{Film, FilmColour, FilmError, FilmFile, FilmFormat, Finished};
 
 use super::output::{OutputArguments, ReportArguments};
@@ -15,7 +16,7 @@ use super::{Refusal, interrupt, print, say};
 #[derive(Debug, Args)]
 pub struct BodyFilmArguments {
     /// Make a film of it as FILE.gif, FILE.mp4 or FILE.webm; the last two take the program ffmpeg
-    #[arg(long, value_name = "FILE", value_parser = film_path)]
+    #[arg(long, value_name = "FILE", value_parser = film_path())]
     film: Option<PathBuf>,
     /// Quantity that colours the film's particles [default: displacement]
     #[arg(long, value_name = "QUANTITY", value_parser = one_of(FilmColour::OF_BODIES), requires = "film")]
@@ -26,7 +27,7 @@ pub struct BodyFilmArguments {
 #[derive(Debug, Args)]
 pub struct SwarmFilmArguments {
     /// Make a film of it as FILE.gif, FILE.mp4 or FILE.webm; the last two take the program ffmpeg
-    #[arg(long, value_name = "FILE", value_parser = film_path)]
+    #[arg(long, value_name = "FILE", value_parser = film_path())]
     film: Option<PathBuf>,
     /// Quantity that colours the film's robots [default: role]
     #[arg(long, value_name = "QUANTITY", value_parser = one_of(FilmColour::OF_SWARMS), requires = "film")]
@@ -40,9 +41,8 @@ fn one_of<const N: usize>(colours: [FilmColour; N]) -> impl TypedValueParser<Val
         .try_map(move |name| named(name).ok_or("no quantity has this name"))
 }
 
-fn film_path(text: &str) -> Result<PathBuf, FilmError> {
-    let path = PathBuf::from(text);
-    FilmFormat::of(&path).map(|_| path)
+fn film_path() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| FilmFormat::of(&path).map(|_| path))
 }
 
 /// A film that will be made.
@@ -57,30 +57,38 @@ impl BodyFilmArguments {
         self.film.is_some()
     }
 
-    /// The film, if one is asked for, in a colour that the body has.
+    /// The film, if one is asked for, in a colour that the body has, beside these results.
     pub fn open(
         &self,
-        output: &OutputArguments,
+        results: Option<&OutputFolder>,
+        force: bool,
         require: impl FnOnce(FilmColour) -> Result<(), FilmError>,
-    ) -> Result<Option<AskedFilm>, FilmError> {
+    ) -> Result<Option<AskedFilm>, Refusal> {
+        let Some(path) = &self.film else { return Ok(None) };
         let colour = self.film_colour.unwrap_or(FilmColour::Displacement);
-        let open = |path: &PathBuf| require(colour).and_then(|()| AskedFilm::open(path, output, colour));
-        self.film.as_ref().map(open).transpose()
+        require(colour)?;
+        AskedFilm::open(path, results, force, colour).map(Some)
     }
 }
 
 impl SwarmFilmArguments {
-    /// The film, if one is asked for.
-    pub fn open(&self, output: &OutputArguments) -> Result<Option<AskedFilm>, FilmError> {
+    /// The film, if one is asked for, beside these results.
+    pub fn open(&self, results: &OutputFolder, force: bool) -> Result<Option<AskedFilm>, Refusal> {
         let colour = self.film_colour.unwrap_or(FilmColour::Role);
-        self.film.as_ref().map(|path| AskedFilm::open(path, output, colour)).transpose()
+        self.film.as_ref().map(|path| AskedFilm::open(path, Some(results), force, colour)).transpose()
     }
 }
 
 impl AskedFilm {
     /// Its file stands beside its place until it is made, and an interrupt removes it.
-    fn open(path: &Path, output: &OutputArguments, colour: FilmColour) -> Result<Self, FilmError> {
-        let file = FilmFile::create(path, output.out(), output.force)?;
+    fn open(
+        path: &Path,
+        results: Option<&OutputFolder>,
+        force: bool,
+        colour: FilmColour,
+    ) -> Result<Self, Refusal> {
+        results.map_or(Ok(()), |results| results.require_outside(path))?;
+        let file = FilmFile::create(path, force)?;
         interrupt::removes([file.part().to_owned()]);
         Ok(Self { file, colour })
     }

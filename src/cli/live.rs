@@ -60,11 +60,19 @@ pub fn live(arguments: &LiveArguments) -> Result<ExitCode, Refusal> {
     let server = arguments.page.server()?;
     let recording = arguments.record.open(&about, false, 1)?;
     let door = arguments.page.announce(&server)?;
-    let command = output::command_line(std::env::args().skip(1));
+    let command = output::own_command_line();
     let stop = interrupt::serves();
     let served = server.serve(session, command, folder, stop).map_err(|source| arguments.page.refuse(source));
     close(door);
-    let session = served?;
+    let session = match served {
+        Ok(session) => session,
+        Err(refusal) => {
+            // What was done cannot be recorded any more.
+            let recording = recording.and_then(|recording| recording.take());
+            recording.map_or(Ok(()), Recording::discard)?;
+            return Err(refusal);
+        }
+    };
     if let Some(recording) = recording {
         if session.frame(&[]).clock == 0.0 {
             // Its file would be run to its end, and no period of it was flown.

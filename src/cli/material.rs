@@ -22,7 +22,10 @@ pub struct MaterialArguments {
     #[arg(
         value_parser = FileName::SCENE,
         hide_possible_values = true,
-        conflicts_with_all = ["lattice", "neighbours", "weights", "young"]
+        conflicts_with_all = [
+            "lattice", "spacing", "a", "b", "angle", "orientation", "neighbours", "weights",
+            "young", "poisson", "shear", "fiber_angle", "plane", "thickness",
+        ]
     )]
     scene: Option<String>,
     #[command(flatten)]

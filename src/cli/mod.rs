@@ -30,6 +30,7 @@ mod swarm;
 mod sweep;
 mod trade;
 
+use std::ffi::OsString;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -115,7 +116,7 @@ pub enum Command {
     /// Replays a recorded flight and lists where today's targets differ from the recorded ones
     #[command(
         after_help = "Examples:\n  flockform swarm gap --record gap.mcap\n  flockform replay gap.mcap\n  flockform replay gap.mcap --set limits.speed=0.5 --tolerance 0.01\n\n\
-                      Exit codes: 0 no target is farther off than the tolerance, 1 some are, 2 bad input."
+                      Exit codes: 0 no target is farther off than the tolerance, 1 some are or the recording breaks off, 2 bad input."
     )]
     Replay(replay::ReplayArguments),
     /// Keeps a swarm in formation over ROS 2 or shared memory: poses in, safe targets out
@@ -330,8 +331,7 @@ pub fn arguments() -> Result<(Arguments, RosArguments), Refusal> {
 }
 
 fn read_arguments() -> Result<(Arguments, RosArguments), Refusal> {
-    let all = std::env::args_os().map(|argument| argument.to_string_lossy().into_owned());
-    let all: Vec<String> = all.collect();
+    let all: Vec<OsString> = std::env::args_os().collect();
     let is_asked = all.iter().any(|argument| argument == "--ros-args");
     let split = RosArguments::parse(all.clone(), &|name| std::env::var(name).ok());
     // Only a node is concerned by wrong ROS variables.
@@ -378,7 +378,11 @@ pub fn refuse(refusal: &Refusal) -> ExitCode {
         eprintln!("{}", interrupt::NOTHING_KEPT);
         return ExitCode::from(FAILED);
     }
-    if matches!(refusal, Refusal::Ranks(ranks::RanksError::SaidElsewhere)) {
+    if matches!(
+        refusal,
+        Refusal::Ranks(ranks::RanksError::SaidElsewhere)
+            | Refusal::Export(export::ExportError::OnRank { .. })
+    ) {
         // A launcher ends all ranks when one of them fails: the one that speaks fails, and gets to speak.
         return ExitCode::SUCCESS;
     }

@@ -164,13 +164,19 @@ impl TypedValueParser for FileName {
         argument: Option<&clap::Arg>,
         value: &OsStr,
     ) -> Result<String, clap::Error> {
-        let word = StringValueParser::new().parse_ref(command, argument, value)?;
-        if word.contains(char::is_control) {
-            // Messages repeat it, and a file from elsewhere may be named to forge some.
-            let message = format!("{word:?} has control characters in it\n  help: rename the file");
-            return Err(command.clone().error(clap::error::ErrorKind::ValueValidation, message));
+        let refuse = |fault: &str| {
+            let message = format!("{:?} {fault}\n  help: rename the file", value.to_string_lossy());
+            command.clone().error(clap::error::ErrorKind::ValueValidation, message)
+        };
+        if value.to_str().is_none() {
+            return Err(refuse("is not UTF-8"));
         }
-        Ok(word)
+        let word = StringValueParser::new().parse_ref(command, argument, value)?;
+        // Messages repeat it, and a file from elsewhere may be named to forge some.
+        match word.contains(char::is_control) {
+            true => Err(refuse("has control characters in it")),
+            false => Ok(word),
+        }
     }
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
@@ -244,10 +250,11 @@ fn from_here(word: &str) -> String {
     below.unwrap_or_else(|| word.to_owned())
 }
 
-/// A scene's name as it is, or its path in full, for a command that is gone on with from another folder.
+/// A scene's name as it is, or its path in full, for a command that is gone on with from another folder. A path through a
+/// folder whose name is no text stays as it is given, and leads there from this folder alone.
 pub fn in_full(scene: &str) -> String {
     let place = Path::new(scene);
     let is_path = bundled(scene).is_none() && place.exists();
     let path = std::path::absolute(place).ok().filter(|_| is_path);
-    path.map_or_else(|| scene.to_owned(), |path| path.display().to_string())
+    path.and_then(|path| path.into_os_string().into_string().ok()).unwrap_or_else(|| scene.to_owned())
 }

@@ -22,7 +22,7 @@ use flockform::swarm::control::scope::NodeScopeError;
 use serde::{Deserialize, Serialize};
 
 use super::live::{self, PageArguments};
-use super::output::command_line;
+use super::output::own_command_line;
 use super::recording::{RecordArguments, close};
 use super::supervise::{Life, supervise};
 use super::swarm::SwarmFileArguments;
@@ -239,7 +239,7 @@ impl LivePage {
         });
         let (monitor, feed) = Monitor::new(swarm.clone(), link)?;
         let (session, place) = (Box::new(monitor), server.place());
-        let command = command_line(std::env::args().skip(1));
+        let command = own_command_line();
         let serve = move || {
             if let Err(error) = server.serve(session, command, PathBuf::new(), interrupt::serves()) {
                 tracing::warn!("the page is no longer served: {error}");

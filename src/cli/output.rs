@@ -85,15 +85,10 @@ pub fn create(out: &Path, force: bool) -> Result<OutputFolder, ExportError> {
 }
 
 impl OutputArguments {
-    /// The folder, if one is asked for by name.
-    pub fn out(&self) -> Option<&Path> {
-        self.out.as_deref()
-    }
-
     /// The folder asked for, or the first of out/NAME, out/NAME-2, ... that is not taken.
     pub fn folder(&self, name: &str) -> Result<OutputFolder, ExportError> {
         let mut folder = self.empty(name)?;
-        folder.set_command(command_line(std::env::args().skip(1)));
+        folder.set_command(own_command_line());
         Ok(folder)
     }
 
@@ -105,7 +100,12 @@ impl OutputArguments {
         for n in 2.. {
             // Making it decides: another run may want the same name at this moment.
             match create(&path, false) {
-                Err(ExportError::NotEmpty(_) | ExportError::Unfinished(_) | ExportError::Busy(_)) => {}
+                Err(
+                    ExportError::NotEmpty(_)
+                    | ExportError::Unfinished(_)
+                    | ExportError::InTheWay(_)
+                    | ExportError::Busy(_),
+                ) => {}
                 created => return created,
             }
             path.set_file_name(format!("{name}-{n}"));
@@ -129,6 +129,11 @@ const WITHOUT_EFFECT: [(&str, bool); 12] = [
     ("--record", true),
     ("--publish", true),
 ];
+
+/// The command that this process was started by, for the reader: as far as it is text.
+pub fn own_command_line() -> String {
+    command_line(std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()))
+}
 
 /// The command with these arguments as a shell takes it, without options that change nothing of its report.
 pub fn command_line(arguments: impl IntoIterator<Item = String>) -> String {

@@ -66,7 +66,9 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
                 let bytes = readable_bytes(bytes);
                 format!("; about {bytes} more if multigrid fails and a factorisation decides")
             });
-            let words = format!("about {all}; {tables} with --figures none --no-report{fallback}");
+            let is_chosen = scene.equilibrium.is_some_and(|asked| asked.accuracy.is_some());
+            let truth = if is_chosen { "; more while the truth for the accuracy is solved for" } else { "" };
+            let words = format!("about {all}; {tables} with --figures none --no-report{fallback}{truth}");
             report.facts.push(("memory".into(), words));
             if let Some(ranks) = ranks {
                 report.facts.extend(Shares::new(&scene, &plan, usize::from(*ranks))?.facts());

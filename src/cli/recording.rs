@@ -3,8 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use flockform::export::OutputFolder;
 use flockform::record::Shared;
 use flockform::record::{About, RecordError, Recording};
+
+use super::Refusal;
 
 #[derive(Debug, Args)]
 pub struct RecordArguments {
@@ -19,8 +22,21 @@ impl RecordArguments {
         self.record.is_some()
     }
 
-    /// The recording, if one is asked for; a file in its place is replaced with `force` alone. A process that goes on
-    /// where another ended leaves that one's file (`.mcap.part`) and writes FILE.2.mcap, and so on.
+    /// The recording beside these results, if one is asked for; a file in its place is replaced with `force` alone.
+    pub fn open_beside(
+        &self,
+        results: Option<&OutputFolder>,
+        about: &About,
+        force: bool,
+    ) -> Result<Option<Shared>, Refusal> {
+        if let (Some(path), Some(results)) = (&self.record, results) {
+            results.require_outside(path)?;
+        }
+        Ok(self.open(about, force, 1)?)
+    }
+
+    /// The same beside nothing. A process that goes on where another ended leaves that one's file (`.mcap.part`) and writes
+    /// FILE.2.mcap, and so on.
     pub fn open(&self, about: &About, force: bool, life: u32) -> Result<Option<Shared>, RecordError> {
         let path = self.record.as_ref().map(|path| match life {
             1 => path.clone(),

@@ -46,7 +46,7 @@ pub fn replay(arguments: &ReplayArguments) -> Result<ExitCode, Refusal> {
     } else {
         say(&words(&report))?;
     }
-    Ok(if report.holds() { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })
+    Ok(if report.holds() && report.is_whole() { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })
 }
 
 fn words(report: &Report) -> String {
@@ -58,7 +58,7 @@ fn words(report: &Report) -> String {
         report.swarm
     );
     if let Some(damage) = &report.damage {
-        words += &format!("caution: the file breaks off: {damage}\n");
+        words += &format!("caution: the file breaks off: {damage}; what came after is not replayed\n");
     }
     let width = report.robots.iter().map(|robot| robot.name.len()).max().unwrap_or(0).max(5);
     words += &format!(

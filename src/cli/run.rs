@@ -25,7 +25,7 @@ use flockform::export::{Drawing, Results, Signed, Timings, write_all};
 use flockform::ranks::Team;
 use flockform::record::About;
 use flockform::record::body::BodyMessages;
-use flockform::scene::{LoadSteps, Scene};
+use flockform::scene::Scene;
 use flockform::shm::Domain;
 use flockform::shm::positions::Positions;
 use flockform::solve::interrupt::Interrupt;
@@ -182,8 +182,6 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     let shown = arguments.publish.as_ref();
     let open = |name: &String| Positions::open(&Domain::from_environment()?, name, plan.count());
     let shown = shown.map(open).transpose()?;
-    let required = |colour| film::run::require_colour(&scene, colour);
-    let film = arguments.film.open(&arguments.output, required)?;
     let folder = others.is_none().then(|| match &left {
         Some(left) => left.open(),
         None => arguments.output.folder(&scene.name),
@@ -193,15 +191,25 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
         // A resumed run is described by how it began.
         folder.set_command(command_line(asked.arguments()));
     }
+    let required = |colour| film::run::require_colour(&scene, colour);
+    let force = arguments.output.force;
+    let film = arguments.film.open(folder.as_ref(), force, required)?;
     let setup = start.elapsed();
     let (own, total) = (plan.setup.body.owned().len(), plan.setup.body.total());
     tracing::info!("planned {own} of {total} particles of `{}` in {setup:.1?}", scene.name);
     tracing::info!("{}", flockform::sweep::chosen_here());
 
+    let undrawn = left.as_ref().map_or_else(Vec::new, |left| left.undrawn(&scene));
+    if arguments.outputs().draws() && !undrawn.is_empty() && !arguments.output.quiet {
+        eprintln!(
+            "caution: no figures were asked for until now: there are none of steps {}",
+            undrawn.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
+        );
+    }
     let outputs = (arguments.outputs(), film.is_some());
     let recorder = Recorder::new(&scene, &plan, folder.as_ref(), left.as_ref(), outputs)?;
     let about = About { source: "run", name: scene.name.clone(), ..About::default() };
-    let recording = arguments.record.open(&about, arguments.output.force, 1)?;
+    let recording = arguments.record.open_beside(folder.as_ref(), &about, force)?;
     let messages = recording.as_ref().map(|one| BodyMessages::new(&scene, one.sink())).transpose()?;
     let quiet = arguments.output.quiet || folder.is_none();
     let mut observer = RunObserver {
@@ -209,7 +217,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
         looks: Looks::new(&plan, shown.is_some() || messages.is_some()),
         shown,
         messages,
-        progress: Progress::of_steps(quiet, steps_of(&scene)),
+        progress: Progress::of_steps(quiet, scene.most_steps()),
         checkpointer: Checkpointer::new(&arguments.checkpoints, (asked, &scene, digest), left.as_ref()),
         interrupted: if folder.is_some() { interrupt::keeps() } else { interrupt::serves() },
         folder,
@@ -325,14 +333,6 @@ impl RunArguments {
                 RunRequest { scene: in_full(scene), set, force }
             }
         }
-    }
-}
-
-/// Steps, or increments, that a run takes at most.
-fn steps_of(scene: &Scene) -> usize {
-    match &scene.load_steps {
-        Some(LoadSteps::Solved(parts)) => parts.len(),
-        _ => scene.stop.steps,
     }
 }
 

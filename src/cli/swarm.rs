@@ -94,12 +94,12 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
             .iter()
             .for_each(|caution| eprintln!("caution: {}", on_terminal(caution)));
     }
-    let film = arguments.film.open(&arguments.output)?;
+    let (folder, force) = (arguments.output.folder(&swarm.name)?, arguments.output.force);
+    let film = arguments.film.open(&folder, force)?;
+    let about = arguments.swarm.about("swarm", &swarm);
+    let recording = arguments.record.open_beside(Some(&folder), &about, force)?;
     let reports = !arguments.report.no_report;
     let mut recorder = (reports || film.is_some()).then(|| FlightRecorder::new(&flight));
-    let folder = arguments.output.folder(&swarm.name)?;
-    let recording =
-        arguments.record.open(&arguments.swarm.about("swarm", &swarm), arguments.output.force, 1)?;
     let interrupted = interrupt::keeps();
     let start = Instant::now();
     let mut watch = |flight: &Flight, _: &Sample| {

@@ -13,6 +13,7 @@ use flockform::export::sweep::{
 };
 use flockform::export::{ExportError, OutputFolder, unfinished};
 use flockform::scene::Scene;
+use flockform::scene::document::is_lost_to;
 use flockform::study::design::{Design, Sampling, Shard};
 use runs::Runs;
 
@@ -90,6 +91,18 @@ impl SweepArguments {
             shard: self.shard.as_deref().map_or(Ok(Shard::WHOLE), str::parse)?,
             force: self.output.force,
         })
+    }
+
+    /// Refuses a key that is set and varied: each run has the varied one alone.
+    fn require_unvaried(&self, design: &Design) -> Result<(), Refusal> {
+        let varies = |set: &&String| design.factors.iter().any(|factor| is_lost_to(set, &factor.key));
+        match self.overrides.set.iter().find(varies) {
+            None => Ok(()),
+            Some(set) => {
+                let message = format!("`{set}` has no effect: each run has a value of --vary there");
+                Err(wrong("--set", message, "leave it out, or vary another key").into())
+            }
+        }
     }
 
     fn require_plotted(&self, outputs: &[String]) -> Result<(), Refusal> {
@@ -230,12 +243,14 @@ fn sweep_here(arguments: &SweepArguments) -> Result<ExitCode, Refusal> {
     };
     let mut sweep = Sweep::new(request, rows)?;
     found.as_ref().map_or(Ok(()), |found| found.begun.require_same(&found.folder, &sweep.begun))?;
+    arguments.require_unvaried(&sweep.design)?;
     arguments.require_plotted(&sweep.request().outputs)?;
     let outputs: Vec<Output> =
         sweep.request().outputs.iter().map(|name| name.parse()).collect::<Result<_, _>>()?;
     let scene = scene_arguments(sweep.request());
     let runs = Runs { scene: &scene, design: &sweep.design, outputs: &outputs };
 
+    runs.require_reached()?;
     let mut pending = sweep.pending();
     // A misspelt key or output is found before a folder is made.
     let first = if found.is_none() && !pending.is_empty() { runs.first(&pending)? } else { Vec::new() };

@@ -15,12 +15,12 @@ use super::study::StudyArguments;
 pub struct TradeArguments {
     #[command(flatten)]
     study: StudyArguments,
-    /// Runs of each setting, of which the median time counts
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
-    repeats: u16,
-    /// Most particles of a body; larger ones are left out
-    #[arg(long, value_name = "N", default_value_t = Grid::default().max_particles)]
-    max_particles: usize,
+    /// Runs of each setting, of which the median time counts [default: 3, or 1 with --quick]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    repeats: Option<u16>,
+    /// Most particles of a body; larger ones are left out [default: 20000, or 3000 with --quick]
+    #[arg(long, value_name = "N")]
+    max_particles: Option<usize>,
     /// A few settings, once each: a trial run, whose figures mean nothing
     #[arg(long)]
     quick: bool,
@@ -28,11 +28,11 @@ pub struct TradeArguments {
 
 /// Runs the scene in many settings and writes what each costs.
 pub fn trade(arguments: &TradeArguments) -> Result<ExitCode, Refusal> {
-    let grid = if arguments.quick {
-        Grid::quick()
-    } else {
-        let (repeats, max_particles) = (usize::from(arguments.repeats), arguments.max_particles);
-        Grid { repeats, max_particles, ..Grid::default() }
+    let usual = if arguments.quick { Grid::quick() } else { Grid::default() };
+    let grid = Grid {
+        repeats: arguments.repeats.map_or(usual.repeats, usize::from),
+        max_particles: arguments.max_particles.unwrap_or(usual.max_particles),
+        ..usual
     };
     // Asked for first, so that a misspelt name is a misspelt name.
     let name = arguments.study.scene.load([])?.name;

@@ -17,7 +17,7 @@ use crate::material::stress::{self, Over, StressState};
 /// Part of the strain energy by which the work done on the way may differ from it.
 const MISSED_WORK: f64 = 0.05;
 /// Strain of a body that has been unloaded again, but for rounding \[1\].
-const UNSTRAINED: f64 = 1e-9;
+const UNSTRAINED: f64 = 1e-7;
 /// Strain beyond which small rotations and strains are a caution \[1\].
 const SMALL_STRAIN: f64 = 0.1;
 /// Turn of a cell beyond which they are \[rad\]: 10 degrees, whose cosine is off by 1.5 %.

@@ -7,8 +7,10 @@
 use super::plan::Plan;
 use crate::flock::body::Cut;
 use crate::flock::law::Weights;
+use crate::flock::neighbourhood::Neighbourhood;
 use crate::flock::outlay::MOST_SITES;
 use crate::flock::role::Role;
+use crate::flock::rules::Mean;
 use crate::geometry::outline::{Outline, Place};
 use crate::scene::{BodySource, Scene, Weights as FixedWeights};
 use crate::solve::corotated::{self, is_corotated};
@@ -18,10 +20,15 @@ use crate::solve::equilibrium::{
 
 /// Fewest bytes that a run of a scene takes, known before anything is laid out; 0 where its layout is refused anyway.
 pub fn at_least(scene: &Scene) -> f64 {
-    let BodySource::Cut(cut) = &scene.body else { return 0.0 };
-    let particles = match cut {
-        Cut::Count { columns, rows } => f64::from(*columns) * f64::from(*rows),
-        Cut::Shape(shape) => {
+    let particles = match &scene.body {
+        BodySource::Points(cloud) => {
+            // The lists, and what finds them anew or sweeps over them; means that are not affine are swept over as they are.
+            let is_within = matches!(scene.neighbourhood, Neighbourhood::Within { .. });
+            let entry = if is_within && scene.mean != Mean::Barycentre { 4.0 } else { 8.0 };
+            return (cloud.ids.len() * EACH) as f64 + entry * cloud.entries as f64;
+        }
+        BodySource::Cut(Cut::Count { columns, rows }) => f64::from(*columns) * f64::from(*rows),
+        BodySource::Cut(Cut::Shape(shape)) => {
             Outline::of_shape(shape).map_or(0.0, |outline| outline.area() / scene.lattice.cell_area())
         }
     };
@@ -42,6 +49,7 @@ pub fn stepped(plan: &Plan) -> usize {
         .map_or(0, |cells| 4 * (cells.starts.len() + cells.index.len() + cells.count()));
     count * EACH
         + bonds * 4
+        + lists_of_the_sweep(plan)
         + match &plan.setup.flock.weights {
             Weights::Equal => 0,
             Weights::Scalar(weights) => 8 * weights.len(),
@@ -59,6 +67,21 @@ pub fn stepped(plan: &Plan) -> usize {
         // Whether each is broken, and a list of those that may still break.
         + present(plan.setup.flock.bonds.is_some(), 4 * bonds)
         + present(plan.setup.present_radius.is_some(), 8 * count)
+}
+
+/// Bytes of the lists that a sweep reads where no two particles see the same, as those of points: a second copy, with a row of
+/// coefficients for each particle where these count. Of a lattice there are few.
+fn lists_of_the_sweep(plan: &Plan) -> usize {
+    let flock = &plan.setup.flock;
+    let is_compiled = flock.rule.mean == Mean::Barycentre && plan.setup.present_radius.is_none();
+    if plan.setup.body.numbering.is_none() || !is_compiled {
+        return 0;
+    }
+    let entry = match &flock.weights {
+        Weights::Equal => 4,
+        Weights::Scalar(_) | Weights::Matrix(_) => 4 + 8,
+    };
+    entry * flock.neighbours.index.len()
 }
 
 /// Bytes that finding the equilibrium takes beside the plan, less the positions that the engine has later; 0 for a scene

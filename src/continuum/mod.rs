@@ -14,6 +14,7 @@ pub mod deviation;
 pub mod digest;
 mod edge_stress;
 pub mod equilibrium;
+pub(crate) mod late;
 pub mod layout;
 pub mod looks;
 pub mod mechanics;

@@ -7,6 +7,7 @@ use super::bulk_response;
 use super::deviation::{Deviation, pieces};
 use super::edge_stress;
 use super::equilibrium::select_solver;
+use super::late;
 use super::memory::neighbour_entries;
 use super::plan::Plan;
 use crate::flock::fracture::Threshold;
@@ -166,13 +167,15 @@ fn facts(
     let stop = match (&scene.equilibrium, plan.stop.tolerance) {
         (Some(asked), _) => {
             let (solver, why) = select_solver(scene, &asked.request, plan)?;
-            let spacing = match asked.accuracy {
-                Some(part) => {
-                    format!("; for an accuracy of {} % the run may halve the spacing", 100.0 * part)
-                }
-                None => String::new(),
+            let how = match asked.accuracy {
+                Some(part) => format!(
+                    "for an accuracy of {} % the run chooses spacing, solver, tolerance and precision, for which it solves for \
+                     the truth as well",
+                    100.0 * part
+                ),
+                None => format!("found by {solver}: {why}"),
             };
-            format!("in the equilibrium of step {}, found by {solver}: {why}{spacing}", plan.stop.steps)
+            format!("in the equilibrium of step {}, {how}", plan.stop.steps)
         }
         (None, Some(tolerance)) => {
             format!("at residual {tolerance:e}, at the latest after {} steps", plan.stop.steps)
@@ -275,13 +278,19 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
     }
     cautions.extend(bulk_response::cautions(scene));
     cautions.extend(dead_pressure(scene));
+    cautions.extend(late::cautions(scene));
     if let (Some(edge), Some(cells)) = (&plan.setup.free_edge, &plan.setup.cells) {
         let body = &plan.setup.body;
         cautions.extend(edge_stress::cautions(edge.of(body, cells), (body, cells), |own| own));
     }
-    let led = |role: &Role| role.is_led();
-    if !plan.setup.roles.iter().any(led) && scene.roles.iter().all(|entry| !led(&entry.role)) {
-        cautions.push("no particle leads: the body relaxes by itself".into());
+    let is_moved = scene.roles.iter().any(|entry| entry.motion.is_some());
+    if !is_moved && plan.setup.flock.forces.is_none() {
+        cautions.push(
+            "no particle is moved and nothing pushes: the body relaxes by itself, or stays as it is".into(),
+        );
+    }
+    if plan.setup.body.body_particles().nth(1).is_none() {
+        cautions.push("the body is a single particle: the lattice is as coarse as the shape is wide".into());
     }
     cautions
 }

@@ -37,6 +37,9 @@ pub struct ComparisonReport {
     /// At the scene's `record.places`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub places: Vec<PlaceComparison>,
+    /// Warnings about the truth.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub cautions: Vec<String>,
     /// The scene, its defaults and overrides included.
     pub scene: RawScene,
 }
@@ -116,6 +119,7 @@ impl ComparisonReport {
                 strain_energy: truth.strain_energy(),
             },
             places: compared.places.clone(),
+            cautions: compared.cautions.clone(),
             scene: scene.raw.clone(),
         }
     }

@@ -100,10 +100,14 @@ pub(super) fn write_final(
     let last = body.owned().filter(|&i| body.index_after_all(i).is_some()).count();
     let all = body.owned().len();
     let (before, last) = (pieces(0..all - last), all - last..all);
+    // The first rank may have no particle, and a row is what the names of the columns are known from.
+    let own = rows.header().unwrap_or_default();
+    let mut headers = team.map_or_else(|| vec![own.clone()], |team| team.each_bytes(&own)).into_iter();
+    let header = headers.find(|header| !header.is_empty()).unwrap_or_default();
     let Some(folder) = folder else {
         let Some(team) = team else { return Ok(None) };
         for piece in before {
-            team.send_bytes(&rows.text(piece, false).unwrap_or_default());
+            team.send_bytes(&rows.text(piece).unwrap_or_default());
         }
         team.send_bytes(&[]);
         let _ = sorted(team, &rows, last);
@@ -112,7 +116,7 @@ pub(super) fn write_final(
     let path = folder.path("final.csv");
     let mut file = create(&path).and_then(|file| {
         let mut file = BufWriter::new(file);
-        rows.write(before, &mut file).map(|()| file)
+        file.write_all(&header).and_then(|()| rows.write(before, &mut file)).map(|()| file)
     });
     // What the others send is received in any case: they wait until it is.
     for (team, rank) in team.iter().flat_map(|team| (1..team.count()).map(move |rank| (team, rank))) {
@@ -140,7 +144,7 @@ fn pieces(rows: Range<usize>) -> Vec<Range<usize>> {
 
 /// These rows of all ranks, in the order of their ids.
 fn sorted(team: &Team, rows: &FinalRows<'_>, own: Range<usize>) -> Vec<u8> {
-    let all = team.each_bytes(&rows.text(own, false).unwrap_or_default()).concat();
+    let all = team.each_bytes(&rows.text(own).unwrap_or_default()).concat();
     let mut lines: Vec<&[u8]> = all.split_inclusive(|&byte| byte == b'\n').collect();
     let digits = |line: &&[u8]| line.iter().take_while(|byte| byte.is_ascii_digit()).count();
     // Without zeros before them, the shorter number is the smaller one.
@@ -179,14 +183,25 @@ impl<'a> FinalRows<'a> {
     /// Writes pieces of them, of which as many are made at once as there are threads.
     fn write(&self, pieces: Vec<Range<usize>>, to: &mut impl Write) -> io::Result<()> {
         for some in pieces.chunks(rayon::current_num_threads().max(1)) {
-            let text = |rows: &Range<usize>| self.text(rows.clone(), rows.start == 0);
-            let texts: Vec<_> = some.par_iter().map(text).collect();
+            let texts: Vec<_> = some.par_iter().map(|rows| self.text(rows.clone())).collect();
             texts.into_iter().try_for_each(|text| to.write_all(&text?))?;
         }
         Ok(())
     }
 
-    fn text(&self, rows: Range<usize>, has_headers: bool) -> io::Result<Vec<u8>> {
+    /// The line above them; nothing without a row.
+    fn header(&self) -> io::Result<Vec<u8>> {
+        let first = 0..self.engine.body().owned().len().min(1);
+        let mut text = self.csv(first, true)?;
+        text.truncate(text.iter().position(|&byte| byte == b'\n').map_or(0, |end| end + 1));
+        Ok(text)
+    }
+
+    fn text(&self, rows: Range<usize>) -> io::Result<Vec<u8>> {
+        self.csv(rows, false)
+    }
+
+    fn csv(&self, rows: Range<usize>, has_headers: bool) -> io::Result<Vec<u8>> {
         let mut text = Vec::new();
         let writer = WriterBuilder::new().has_headers(has_headers).from_writer(&mut text);
         write_rows(writer, rows.map(|n| self.row(n)))?;

@@ -40,9 +40,23 @@ pub enum ExportError {
         .0.display(), .0.display(), command = resumed_by(.0)
     )]
     Unfinished(PathBuf),
+    /// Something else where an unfinished run would be kept.
+    #[error("{} is in the way of what is kept of a run that is broken off: move it away, or give another --out", .0.display())]
+    InTheWay(PathBuf),
     /// Another program is writing the same outputs.
     #[error("{} is being written by another flockform that still runs: wait for it, or give another --out", .0.display())]
     Busy(PathBuf),
+    /// A file of its own, a film or a recording, that would stand in the folder of outputs, which appears only at the end.
+    #[error(
+        "{} would stand in {}, which is for the results alone\n  help: give it a place outside, or another --out",
+        .file.display(), .out.display()
+    )]
+    InResults {
+        /// The file.
+        file: PathBuf,
+        /// The folder.
+        out: PathBuf,
+    },
     /// A checkpoint counts on a frame for ParaView that is not there.
     #[error("{} is missing, which the checkpoint beside it needs: start the run again", .0.display())]
     MissingFrame(PathBuf),

@@ -12,7 +12,7 @@
 use std::ffi::OsString;
 use std::fs::{self, File, TryLockError};
 use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use super::error::ExportError;
@@ -106,6 +106,18 @@ impl OutputFolder {
     /// The folder in which everything stands until [`OutputFolder::commit`].
     pub fn folder(&self) -> &Path {
         &self.partial
+    }
+
+    /// Refuses a file beside the outputs, a film or a recording, whose place is among them.
+    ///
+    /// # Errors
+    /// A place in the folder under its later name, or one that cannot be looked at.
+    pub fn require_outside(&self, file: &Path) -> Result<(), ExportError> {
+        let [at, out] = [file, &self.out].map(|path| resolved(path).map_err(ExportError::io("find", path)));
+        match at?.starts_with(out?) {
+            true => Err(ExportError::InResults { file: file.to_owned(), out: self.out.clone() }),
+            false => Ok(()),
+        }
     }
 
     /// Sets the command that makes its content again, which reports show.
@@ -209,16 +221,33 @@ fn in_full(out: &Path) -> Result<PathBuf, ExportError> {
     found.map_err(ExportError::io("find", out))
 }
 
+/// A path without links and steps back, as far as it is there already.
+fn resolved(path: &Path) -> std::io::Result<PathBuf> {
+    let path = std::path::absolute(path)?;
+    let there = path.ancestors().find_map(|above| Some((above, fs::canonicalize(above).ok()?)));
+    let Some((above, mut found)) = there else { return Ok(path) };
+    for part in path.strip_prefix(above).into_iter().flat_map(Path::components) {
+        match part {
+            Component::ParentDir => drop(found.pop()),
+            part => found.push(part),
+        }
+    }
+    Ok(found)
+}
+
 /// Refuses a place that is not free for new outputs.
 fn require_free(out: &Path, force: bool) -> Result<(), ExportError> {
     standing(out, force)?;
     make_way(&unfinished(out), force)
 }
 
-/// Discards a run that was killed, where that is asked for.
+/// Discards a run that was killed, where that is asked for; what else is in its place is nobody's to discard.
 fn make_way(unfinished: &Path, force: bool) -> Result<(), ExportError> {
-    if ![checkpoint::FILE, sweep::REQUEST].iter().any(|file| unfinished.join(file).exists()) {
+    if unfinished.symlink_metadata().is_err() {
         return Ok(());
+    }
+    if ![checkpoint::FILE, sweep::REQUEST].iter().any(|file| unfinished.join(file).exists()) {
+        return Err(ExportError::InTheWay(unfinished.to_owned()));
     }
     if !force {
         return Err(ExportError::Unfinished(unfinished.to_owned()));

@@ -94,7 +94,8 @@ fn pictures(scene: &Scene, plan: &Plan, moments: usize) -> usize {
     /// Heading and axes beside a body, and the bar of its colours \[px\].
     const ABOVE: f64 = 60.0;
     const BAR: f64 = 100.0;
-    /// Height of a chart \[px\].
+    /// Height of the panels of probes, three of the four, and of a chart \[px\].
+    const PROBES: f64 = 740.0;
     const CHART: f64 = 560.0;
     let bytes = |[width, height]: [f64; 2]| 4 * (f64::from(PNG_ZOOM).powi(2) * width * height) as usize;
     let body = &plan.setup.body;
@@ -108,8 +109,12 @@ fn pictures(scene: &Scene, plan: &Plan, moments: usize) -> usize {
         let (axes, is_row) = components::window(&body.reference, 0..plan.count(), body.lattice.spacing());
         sheets.extend(vec![bytes(panels::sheet_size(&axes, is_row, [BAR, ABOVE])); moments]);
     }
-    let charts = [!plan.probes.is_empty(), scene.equilibrium.is_some(), scene.load_steps.is_some()];
-    sheets.extend(charts.into_iter().filter(|&is| is).map(|_| bytes([page::WIDTH, CHART])));
+    let charts = [
+        (!plan.probes.is_empty(), PROBES),
+        (scene.equilibrium.is_some(), CHART),
+        (scene.load_steps.is_some(), CHART),
+    ];
+    sheets.extend(charts.iter().filter(|(is, _)| *is).map(|(_, height)| bytes([page::WIDTH, *height])));
     sheets.sort_unstable_by(|a, b| b.cmp(a));
     let at_once = rayon::current_num_threads();
     let dots = if plan.count() <= MOST_DOTS { DOT * plan.count() * at_once.min(moments) } else { 0 };

@@ -18,7 +18,7 @@ pub(super) fn write_each(
     let written = write(&folder.join(name(team.rank())));
     let failed = team.each([u64::from(written.is_err())]).iter().position(|&[failed]| failed == 1);
     match failed {
-        Some(rank) if written.is_ok() => Err(ExportError::OnRank { rank, path: folder.join(name(rank)) }),
+        Some(rank) if rank != team.rank() => Err(ExportError::OnRank { rank, path: folder.join(name(rank)) }),
         _ => written,
     }
 }

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::error::{ExportError, write_file};
 use super::{OutputFolder, bonds, largest_strain};
+use crate::continuum::late;
 use crate::continuum::mechanics::{Mechanics, Peak, Stresses};
 use crate::continuum::places::{AtPlace, at_places};
 use crate::continuum::report::dead_pressure;
@@ -258,8 +259,10 @@ impl Summary {
 }
 
 fn cautions(scene: &Scene, engine: &Engine, measured: Option<&Measured>) -> Vec<String> {
-    let Some(measured) = measured else { return Vec::new() };
-    dead_pressure(scene).into_iter().chain(measured.mechanics.cautions(engine)).collect()
+    let of_forces = |measured: &Measured| {
+        dead_pressure(scene).into_iter().chain(measured.mechanics.cautions(engine)).collect::<Vec<_>>()
+    };
+    late::cautions(scene).into_iter().chain(measured.map(of_forces).into_iter().flatten()).collect()
 }
 
 impl Measured {

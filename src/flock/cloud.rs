@@ -18,6 +18,8 @@ pub struct Cloud {
     pub ids: Vec<u32>,
     /// The median of the distances to the nearest other point \[length\].
     pub spacing: f64,
+    /// How many others the points see within the radius, all together.
+    pub entries: u64,
 }
 
 /// Neighbours within this part more than a radius count as within it, so that the places of a lattice, which are
@@ -33,17 +35,26 @@ impl Cloud {
     /// # Errors
     /// A radius that holds too many.
     pub fn new(points: Vectors, ids: Vec<u32>, radius: f64) -> Result<Self, BodyError> {
-        let neighbours = within(&points, radius)?;
+        let (grid, reach) = sorted(&points, radius)?;
+        let mut entries = 0;
+        // Seen, and not listed: whether there is room for the lists is asked once it is known how long they are.
         let nearest = |i: usize| {
-            let apart = neighbours.of(i).iter().map(|&k| distance(points.get(i), points.get(k as usize)));
-            apart.fold(f64::INFINITY, f64::min)
+            let mut least = f64::INFINITY;
+            grid.each_within(&points, i, reach, |k| {
+                entries += 1;
+                least = least.min(distance(points.get(i), points.get(k as usize)));
+            });
+            least
         };
         let mut apart: Vec<f64> = (0..points.len()).map(nearest).filter(|apart| apart.is_finite()).collect();
+        if entries > MOST_ENTRIES {
+            return Err(BodyError::TooManyNeighbours { radius, about: entries, limit: MOST_ENTRIES });
+        }
         let middle = apart.len() / 2;
         // Where no point has a neighbour the radius is all that is known.
         let spacing =
             if apart.is_empty() { radius } else { *apart.select_nth_unstable_by(middle, f64::total_cmp).1 };
-        Ok(Self { points, ids, spacing })
+        Ok(Self { points, ids, spacing, entries })
     }
 }
 
@@ -54,11 +65,11 @@ impl Body {
     /// # Errors
     /// A radius that holds too many, or none for some particle.
     pub(crate) fn of_cloud(cloud: &Cloud, radius: Option<f64>) -> Result<(Self, Neighbours), BodyError> {
-        let Cloud { points, ids, spacing } = cloud;
+        let Cloud { points, ids, spacing, entries } = cloud;
         let order = order_in_columns(points, *spacing);
         let places: Vectors = order.iter().map(|&row| points.get(row as usize)).collect();
         let neighbours = match radius {
-            Some(radius) => within(&places, radius)?,
+            Some(radius) => within(&places, radius, *entries)?,
             None => Neighbours::from_lists(places.iter().map(|_| [])),
         };
         let body = Self {
@@ -75,7 +86,22 @@ impl Body {
     }
 }
 
-fn within(points: &Vectors, radius: f64) -> Result<Neighbours, BodyError> {
+/// The neighbours of each point, as many as there are in all: the lists take no more memory than that.
+fn within(points: &Vectors, radius: f64, entries: u64) -> Result<Neighbours, BodyError> {
+    let (grid, reach) = sorted(points, radius)?;
+    let mut neighbours = Neighbours { starts: vec![0], index: Vec::with_capacity(entries as usize) };
+    for i in 0..points.len() {
+        grid.within(points, i, reach, &mut neighbours.index);
+        neighbours.starts.push(neighbours.index.len() as u32);
+    }
+    Ok(neighbours)
+}
+
+/// The points in cells in which those within a radius are found, and the radius that is looked in.
+///
+/// # Errors
+/// A radius that holds too many.
+fn sorted(points: &Vectors, radius: f64) -> Result<(CellGrid, f64), BodyError> {
     let (reach, all) = (radius * (1.0 + MARGIN), vec![true; points.len()]);
     let mut grid = CellGrid::default();
     grid.fill(points, &all, reach);
@@ -86,9 +112,7 @@ fn within(points: &Vectors, radius: f64) -> Result<Neighbours, BodyError> {
     if about > MOST_ENTRIES {
         return Err(BodyError::TooManyNeighbours { radius, about, limit: MOST_ENTRIES });
     }
-    let mut neighbours = Neighbours::default();
-    neighbours.rebuild_within(&mut grid, points, &all, reach);
-    Ok(neighbours)
+    Ok((grid, reach))
 }
 
 #[cfg(test)]

@@ -90,19 +90,29 @@ impl CellGrid {
     /// Appends to `found` every other point within `radius` of `particle`, in order of index. A radius up
     /// to that of the last [`CellGrid::fill`] looks into nine cells, a larger one into more.
     pub fn within(&self, points: &Vectors, particle: usize, radius: f64, found: &mut Vec<u32>) {
+        let begin = found.len();
+        self.each_within(points, particle, radius, |member| found.push(member));
+        // Index order, so that no sum depends on how the cells were walked.
+        found[begin..].sort_unstable();
+    }
+
+    /// Shows the same points, in the order of the cells.
+    pub(crate) fn each_within(
+        &self,
+        points: &Vectors,
+        particle: usize,
+        radius: f64,
+        mut see: impl FnMut(u32),
+    ) {
         let here = points.get(particle);
         if self.columns == 0 || !(here[0].is_finite() && here[1].is_finite()) {
             return;
         }
         let columns = self.cells_within(here[0], radius, 0);
-        let rows = self.cells_within(here[1], radius, 1);
-        let begin = found.len();
-        for row in rows {
+        for row in self.cells_within(here[1], radius, 1) {
             let near = self.slots.near(self.run(row, &columns), here, radius);
-            found.extend(near.filter(|&member| member as usize != particle));
+            near.filter(|&member| member as usize != particle).for_each(&mut see);
         }
-        // Index order, so that no sum depends on how the cells were walked.
-        found[begin..].sort_unstable();
     }
 
     /// Replaces the lists by those of every point within the radius of the last [`CellGrid::fill`] of

@@ -4,6 +4,7 @@
 //! leaders over to the followers exactly, so a manoeuvre of the leaders is one of the formation.
 
 use super::block::{Block, IDENTITY, apply};
+use super::vectors::Vectors;
 
 /// `x -> about + translate + matrix (x - about)` \[length, world frame\].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,6 +55,11 @@ impl Posture {
         Affine { about, translate: self.translate, matrix }
     }
 
+    /// Stretch and shear, before the turn.
+    fn shape(&self) -> Block {
+        [[self.stretch[0], self.shear[0]], [self.shear[1], self.stretch[1]]]
+    }
+
     /// The posture this part of the way to another.
     fn towards(&self, other: &Posture, part: f64) -> Posture {
         let pair = |a: [f64; 2], b: [f64; 2]| [0, 1].map(|k| a[k] + part * (b[k] - a[k]));
@@ -76,6 +82,18 @@ pub struct Leg {
     /// Where the leg leads, counted from the formation as it was laid out.
     pub posture: Posture,
 }
+
+/// The most that a manoeuvre asks of any place.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Demand {
+    /// \[length/s\]
+    pub speed: f64,
+    /// \[length/s^2\]
+    pub acceleration: f64,
+}
+
+/// Looks at a leg less one; even, so that its fastest instant, the middle, is looked at.
+const LOOKS: u32 = 128;
 
 /// Legs one after another, from the nominal posture unless `from` says otherwise.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,6 +131,47 @@ impl Manoeuvre {
         self.posture(time).affine(self.about)
     }
 
+    /// Speed and acceleration of the place that is moved most, from the derivatives of the map.
+    ///
+    /// The part `s(t)` of a leg's way takes a place `X`, counted from the centre, to `d(s) + R(s) M(s) X`: `d` and `M` are
+    /// linear in `s`, and so is the angle of the turn `R`, by `w` in all. Its velocity is `s' (d' + R V X)` with
+    /// `V = M' + w J M`, its acceleration `s'' (d' + R V X) + s'^2 R (2 w J M' - w^2 M) X`, `J` being a quarter turn. A leg
+    /// of many rounds turns far between two looks: the angle between the two summands then counts as the smallest that it
+    /// has there.
+    pub fn demand(&self, places: &Vectors) -> Demand {
+        let mut demand = Demand::default();
+        let mut from = &self.from;
+        for Leg { seconds, posture, .. } in &self.legs {
+            let moved = [0, 1].map(|k| posture.translate[k] - from.translate[k]);
+            let (deforms, turns) = (difference(posture, from), posture.rotate - from.rotate);
+            for look in 0..=LOOKS {
+                let u = f64::from(look) / f64::from(LOOKS);
+                let pace = 6.0 * u * (1.0 - u) / seconds;
+                let gain = 6.0 * (1.0 - 2.0 * u) / (seconds * seconds);
+                let slack = turns.abs() * pace * seconds * 0.5 / f64::from(LOOKS);
+                let now = from.towards(posture, u * u * (3.0 - 2.0 * u));
+                let shape = now.shape();
+                let velocity = combined(1.0, &deforms, turns, &turned(&shape));
+                let rate = turns * pace;
+                let bend = combined(2.0 * rate * pace, &turned(&deforms), -rate * rate, &shape);
+                let change = combined(gain, &velocity, 1.0, &bend);
+                // As the formation sees it, which has turned.
+                let (sin, cos) = now.rotate.sin_cos();
+                let shift = [cos * moved[0] + sin * moved[1], cos * moved[1] - sin * moved[0]];
+                for place in places.iter() {
+                    let away = [0, 1].map(|k| place[k] - self.about[k]);
+                    let speed = pace * longest_sum(shift, apply(&velocity, away), slack);
+                    let acceleration =
+                        longest_sum(shift.map(|part| gain * part), apply(&change, away), slack);
+                    demand.speed = demand.speed.max(speed);
+                    demand.acceleration = demand.acceleration.max(acceleration);
+                }
+            }
+            from = posture;
+        }
+        demand
+    }
+
     /// When the last leg's posture is reached \[s\].
     pub fn duration(&self) -> f64 {
         let all: f64 = self.legs.iter().map(|leg| leg.seconds + leg.hold).sum();
@@ -120,11 +179,35 @@ impl Manoeuvre {
     }
 }
 
+/// What stretch and shear of one posture have more than those of another.
+fn difference(one: &Posture, other: &Posture) -> Block {
+    combined(1.0, &one.shape(), -1.0, &other.shape())
+}
+
+fn combined(a: f64, first: &Block, b: f64, second: &Block) -> Block {
+    [0, 1].map(|i| [0, 1].map(|k| a * first[i][k] + b * second[i][k]))
+}
+
+/// After a quarter turn to the left.
+fn turned([x, y]: &Block) -> Block {
+    [y.map(|value| -value), *x]
+}
+
+/// The length of the sum of two vectors whose angle may be smaller by `slack` \[rad\].
+fn longest_sum(first: [f64; 2], second: [f64; 2], slack: f64) -> f64 {
+    let [a, b] = [first, second].map(|one| f64::hypot(one[0], one[1]));
+    let cross = first[0] * second[1] - first[1] * second[0];
+    let angle = cross.atan2(first[0] * second[0] + first[1] * second[1]).abs();
+    let (sin, cos) = (angle - slack).max(0.0).sin_cos();
+    f64::hypot(a + b * cos, b * sin)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flock::vectors::distance;
 
-    fn turned() -> Posture {
+    fn posed() -> Posture {
         Posture {
             translate: [5.0, 0.0],
             rotate: std::f64::consts::FRAC_PI_2,
@@ -135,15 +218,59 @@ mod tests {
 
     #[test]
     fn a_posture_stretches_and_shears_before_it_turns() {
-        let [x, y] = turned().affine([1.0, 1.0]).apply([2.0, 3.0]);
+        let [x, y] = posed().affine([1.0, 1.0]).apply([2.0, 3.0]);
         // (1, 2) from the centre, stretched and sheared (3, 2), turned (-2, 3).
         assert!((x - 4.0).abs() < 1e-15 && (y - 4.0).abs() < 1e-15, "{x} {y}");
     }
 
     #[test]
+    fn a_manoeuvre_asks_for_what_its_map_does_however_often_it_turns() {
+        let places: Vectors = [[2.0, 0.5], [0.0, 3.0], [-1.0, -1.0]].into_iter().collect();
+        let to = |seconds: f64, posture: Posture| Leg { seconds, hold: 1.0, posture };
+        let legs = vec![to(2.0, posed()), to(4.0, Posture { rotate: -2.0, ..Posture::NOMINAL })];
+        let manoeuvre = Manoeuvre { about: [1.0, 1.0], from: Posture::NOMINAL, legs };
+        // By differences of the map itself.
+        let (h, mut speed, mut acceleration) = (1e-4, 0.0_f64, 0.0_f64);
+        for k in 1..80_000 {
+            let t = f64::from(k) * h;
+            // Not across the jump of acceleration at the ends of a leg.
+            if [0.0, 2.0, 3.0, 7.0].iter().any(|end| (t - end).abs() < 1.5 * h) {
+                continue;
+            }
+            for place in places.iter() {
+                let [a, b, c] = [t - h, t, t + h].map(|t| manoeuvre.affine(t).apply(place));
+                speed = speed.max(distance(a, c) / (2.0 * h));
+                acceleration = acceleration
+                    .max(f64::hypot(a[0] - 2.0 * b[0] + c[0], a[1] - 2.0 * b[1] + c[1]) / (h * h));
+            }
+        }
+        let found = manoeuvre.demand(&places);
+        let is_near = |found: f64, exact: f64| (-1e-3..5e-3).contains(&(found / exact - 1.0));
+        assert!(is_near(found.speed, speed), "{found:?} for {speed}");
+        assert!(is_near(found.acceleration, acceleration), "{found:?} for {acceleration}");
+
+        // Round and round, a place goes at 1.5 times the mean speed in the middle.
+        let radius = distance(places.get(2), [1.0, 1.0]);
+        for rounds in [0.1, 1.0, 1000.0, 12_345.6] {
+            let (seconds, rotate) = (1000.0, rounds * std::f64::consts::TAU);
+            let moved = |translate| {
+                let posture = Posture { rotate, translate, ..Posture::NOMINAL };
+                let legs = vec![to(seconds, posture)];
+                Manoeuvre { about: [1.0, 1.0], from: Posture::NOMINAL, legs }.demand(&places).speed
+            };
+            let (turn, far) = (1.5 * rotate * radius / seconds, 3000.0);
+            assert!((moved([0.0; 2]) / turn - 1.0).abs() < 1e-12, "{rounds}");
+            if rounds > 100.0 {
+                let both = moved([far, 0.0]);
+                assert!((both / (turn + 1.5 * far / seconds) - 1.0).abs() < 1e-6, "{rounds}: {both}");
+            }
+        }
+    }
+
+    #[test]
     fn a_manoeuvre_goes_from_leg_to_leg_and_rests_between() {
         let legs = vec![
-            Leg { seconds: 2.0, hold: 1.0, posture: turned() },
+            Leg { seconds: 2.0, hold: 1.0, posture: posed() },
             Leg { seconds: 4.0, hold: 1.0, posture: Posture::NOMINAL },
         ];
         let manoeuvre = Manoeuvre { about: [0.0; 2], from: Posture::NOMINAL, legs };

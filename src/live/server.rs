@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tungstenite::handshake::derive_accept_key;
 
@@ -21,6 +21,8 @@ const MOST_VIEWERS: usize = 8;
 const MOST_CONNECTIONS: usize = 32;
 /// Requests that wait for the session; viewers that ask for more wait with them.
 const MOST_REQUESTS: usize = 256;
+/// How long the session may take to end what it was asked last; it is left behind then.
+const PATIENCE: Duration = Duration::from_millis(700);
 /// Time between two looks for a new connection.
 const LOOK: Duration = Duration::from_millis(10);
 
@@ -76,7 +78,8 @@ impl Server {
     /// that which began the session, as its page shows it.
     ///
     /// # Errors
-    /// A listener that is gone, no threads, or a session that has panicked.
+    /// A listener that is gone, no threads, a session that has panicked, or one that is still busy with what it was asked
+    /// last (`TimedOut`): its thread, which nothing interrupts, is left behind, and what the session has with it.
     pub fn serve(
         self,
         session: Box<dyn Session>,
@@ -98,17 +101,25 @@ impl Server {
             connections: AtomicUsize::new(0),
             viewers: AtomicU64::new(0),
         });
-        std::thread::scope(|scope| {
-            let run = move || conductor.run(&asked, stop);
-            let run = std::thread::Builder::new().name("live session".into()).spawn_scoped(scope, run)?;
-            while !stop.load(Ordering::Relaxed) && !shared.board.is_closed() {
-                match self.listener.accept() {
-                    Ok((stream, _)) => admit(stream, &shared),
-                    Err(_) => std::thread::sleep(LOOK),
-                }
+        let ended = Arc::new(AtomicBool::new(false));
+        let is_ended = Arc::clone(&ended);
+        let run = move || conductor.run(&asked, &is_ended);
+        let run = std::thread::Builder::new().name("live session".into()).spawn(run)?;
+        while !stop.load(Ordering::Relaxed) && !shared.board.is_closed() {
+            match self.listener.accept() {
+                Ok((stream, _)) => admit(stream, &shared),
+                Err(_) => std::thread::sleep(LOOK),
             }
-            run.join().map_err(|_| io::Error::other("the session has panicked"))
-        })
+        }
+        ended.store(true, Ordering::Relaxed);
+        let since = Instant::now();
+        while !run.is_finished() {
+            if since.elapsed() > PATIENCE {
+                return Err(io::Error::new(io::ErrorKind::TimedOut, "the session is still busy"));
+            }
+            std::thread::sleep(LOOK);
+        }
+        run.join().map_err(|_| io::Error::other("the session has panicked"))
     }
 }
 

@@ -48,9 +48,14 @@ pub(super) fn numbers(name: &str, given: &Bound<'_, PyAny>) -> PyResult<(Vec<f64
     Ok((numbers, shape))
 }
 
-/// A number for each pair of `count`, by rows; NaN where there is none.
+/// A number that is not negative for each pair of `count`, by rows; NaN where there is none.
 pub(super) fn square(name: &str, given: &Bound<'_, PyAny>, count: usize) -> PyResult<Vec<f64>> {
     let (numbers, shape) = reals(name, given)?;
+    if let Some(at) = numbers.iter().position(|number| *number < 0.0 || number.is_infinite()) {
+        let (place, number) = (index_of(at, &shape), numbers[at]);
+        let message = format!("{name}{place} is {number}: give a finite number from 0 on, or NaN for none");
+        return Err(PyValueError::new_err(message));
+    }
     if shape == [count, count] { Ok(numbers) } else { Err(wrong_shape(name, &shape, &[count, count])) }
 }
 
@@ -125,6 +130,11 @@ fn as_array<'py>(
     dtype: &str,
 ) -> PyResult<Bound<'py, PyAny>> {
     let numpy = given.py().import("numpy")?;
+    // What is masked would be taken for a number.
+    if given.is_instance(&numpy.getattr("ma")?.getattr("MaskedArray")?)? {
+        let message = format!("{name} is a masked array: give its values, where all of them are known");
+        return Err(PyTypeError::new_err(message));
+    }
     let array = numpy.call_method1("asarray", (given,));
     let array = array.map_err(|error| PyTypeError::new_err(format!("{name} is no array: {error}")))?;
     let found = array.getattr("dtype")?;

@@ -77,8 +77,12 @@ impl Swarm {
                 PyValueError::new_err(format!("robot = `{name}`: give one of {}", self.names().join(", ")))
             });
         }
-        let one = indices("robot", given, self.count())?;
-        one.first().copied().ok_or_else(|| PyValueError::new_err("robot: give an index or a name"))
+        match indices("robot", given, self.count())?[..] {
+            [one] => Ok(one),
+            _ => {
+                Err(PyValueError::new_err("robot: give one index or name; several robots are led one by one"))
+            }
+        }
     }
 }
 

@@ -96,6 +96,16 @@ pub enum RecordError {
         /// The remedy.
         help: String,
     },
+    /// What the file lacks because it is damaged.
+    #[error("{} breaks off: {damage}; of what comes before that: {error}", .path.display())]
+    BreaksOff {
+        /// Path of the file.
+        path: PathBuf,
+        /// The damage.
+        damage: String,
+        /// The error that the rest of the file gives.
+        error: Box<RecordError>,
+    },
     /// The swarm of a recording, with the overrides, is none.
     #[error("{0}")]
     Scene(#[from] crate::scene::SceneError),

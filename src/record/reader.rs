@@ -130,8 +130,18 @@ impl Reader {
         Ok(described)
     }
 
+    /// An error of what can be read, with the damage that ends it, if the file is damaged: what is lacking may have come after.
+    pub(super) fn after_damage(&self, error: RecordError) -> RecordError {
+        match self.each(&mut |_| {}) {
+            Ok(Some(damage)) => {
+                RecordError::BreaksOff { path: self.path.clone(), damage, error: Box::new(error) }
+            }
+            _ => error,
+        }
+    }
+
     /// Shows every CDR message to `see`, in the order of the file, until it is damaged or ends. Returns what is
-    /// wrong with its end, if anything is.
+    /// wrong with its end, if anything is: damage behind the last message is none.
     pub fn each(&self, see: &mut dyn FnMut(&Entry)) -> Result<Option<String>, RecordError> {
         let mut kinds: BTreeMap<u16, Arc<str>> = BTreeMap::new();
         let mut channels: BTreeMap<u16, (Arc<str>, Arc<str>)> = BTreeMap::new();
@@ -159,7 +169,7 @@ impl Reader {
             ControlFlow::Continue(())
         });
         Ok(match scanned {
-            Err(error) => Some(error.to_string()),
+            Err(error) => (!is_closed).then(|| error.to_string()),
             Ok(()) => (!is_closed).then(|| "it was never closed".to_owned()),
         })
     }

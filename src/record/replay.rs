@@ -21,7 +21,7 @@ use crate::messages::names::Names;
 use crate::messages::recorder::{parameters, set_parameter};
 use crate::messages::std_msgs::Header;
 use crate::scene::swarm::Swarm;
-use crate::swarm::control::{Control, Mode};
+use crate::swarm::control::{Control, Mode, scope};
 use crate::swarm::flight::{FlightCommand, commands};
 use crate::swarm::watch::Range;
 
@@ -72,9 +72,14 @@ impl RobotDifference {
 }
 
 impl Report {
-    /// Whether no target is farther off than the tolerance, and none is missing.
+    /// Whether no target is farther off than the tolerance, and none is missing; of a file that breaks off, as far as it goes.
     pub fn holds(&self) -> bool {
         self.robots.iter().all(RobotDifference::holds)
+    }
+
+    /// Whether all that was recorded has been read: a file that breaks off may have had more.
+    pub fn is_whole(&self) -> bool {
+        self.damage.is_none()
     }
 
     /// The largest difference of all \[m\].
@@ -89,7 +94,8 @@ impl Report {
 /// A recording without a swarm; what the overrides make of it.
 pub fn recorded_swarm(reader: &Reader, set: &[String]) -> Result<Swarm, RecordError> {
     let described = reader.described()?;
-    let text = described.swarm.ok_or_else(|| RecordError::NoSwarm(reader.path().to_owned()))?;
+    let nameless = || RecordError::NoSwarm(reader.path().to_owned());
+    let text = described.swarm.ok_or_else(nameless).map_err(|error| reader.after_damage(error))?;
     let of = |key: &str| described.metadata.get(key).cloned();
     let given: Vec<String> = of("set").and_then(|set| serde_json::from_str(&set).ok()).unwrap_or_default();
     let (name, folder) = (of("name").unwrap_or_default(), of("folder").map(PathBuf::from));
@@ -111,7 +117,7 @@ pub fn replay(reader: &Reader, swarm: &Swarm, tolerance: f64) -> Result<Report, 
     }
     let unusable = |what: &str, help: &str| {
         let (path, what, help) = (reader.path().to_owned(), what.to_owned(), help.to_owned());
-        Err(RecordError::Unusable { path, what, help })
+        Err(reader.after_damage(RecordError::Unusable { path, what, help }))
     };
     if let Some(refusal) = replay.refusal {
         return unusable(&refusal, "give the swarm file that was flown with --swarm");
@@ -179,12 +185,7 @@ impl Replay {
         };
         let count = control.formation().count();
         let member = described.metadata.get("member").and_then(|name| control.formation().number(name));
-        let mut heard_of: Vec<usize> = (0..count).collect();
-        if let Some(m) = member {
-            heard_of = control.formation().depends_on(m);
-            heard_of.push(m);
-            heard_of.sort_unstable();
-        }
+        let heard_of = member.map_or((0..count).collect(), |m| scope::heard(swarm, &control, m));
         control.listen_to(&heard_of);
         control.set_active(false);
         let fleet = described.metadata.get("namespace").map_or("/", String::as_str);

@@ -112,6 +112,14 @@ impl Targets {
             Self::Array(topic) => topic.topic(),
         }
     }
+
+    /// Of each topic, whether those that sent targets on it have taken leave.
+    fn left(&self) -> Vec<Option<bool>> {
+        match self {
+            Self::Stamped(all) => all.iter().map(Subscription::is_left).collect(),
+            Self::Array(topic) => vec![topic.is_left()],
+        }
+    }
 }
 
 /// Messages of an array taken in a period at most: each node of one robot sends its own.
@@ -251,7 +259,8 @@ impl RobotNodes {
             self.pace.wait();
             self.tick();
             if let Some(pulse) = &self.pulse {
-                pulse.note_peers(std::mem::take(&mut self.link.was_sent));
+                let was_sent = std::mem::take(&mut self.link.was_sent);
+                pulse.note_peers(was_sent, || self.link.targets.left());
             }
             if self.pulse.as_ref().is_some_and(|pulse| pulse.is_given_up()) {
                 return false;

@@ -135,6 +135,14 @@ impl Scene {
         }
     }
 
+    /// Steps, or increments, that a run takes at most.
+    pub fn most_steps(&self) -> usize {
+        match &self.load_steps {
+            Some(LoadSteps::Solved(parts)) => parts.len(),
+            _ => self.stop.steps,
+        }
+    }
+
     /// Whether its equilibrium is solved for without states in between.
     pub fn is_solved_at_once(&self) -> bool {
         self.equilibrium.is_some() && self.load_steps.is_none()

@@ -5,6 +5,7 @@ use csv::{Error, Position, Reader, ReaderBuilder, StringRecord, Trim};
 /// A file whose rows are read one after the other.
 pub struct Rows<'t> {
     pub header: Vec<String>,
+    text: &'t str,
     reader: Reader<&'t [u8]>,
 }
 
@@ -23,8 +24,9 @@ impl<'t> Rows<'t> {
     /// A sentence that names what is wrong with the header.
     pub fn of(text: &'t str) -> Result<Self, String> {
         let mut reader = ReaderBuilder::new().trim(Trim::All).from_reader(text.as_bytes());
-        let header = reader.headers().map_err(in_words)?.iter().map(str::to_owned).collect();
-        Ok(Self { header, reader })
+        let header = reader.headers().map_err(|error| in_words(&error, text))?;
+        let header = header.iter().map(str::to_owned).collect();
+        Ok(Self { header, text, reader })
     }
 
     /// The header as the file has it.
@@ -43,8 +45,8 @@ impl<'t> Rows<'t> {
     /// The first sentence that `row` gives, or one of a row that is longer or shorter than the header.
     pub fn each(mut self, mut row: impl FnMut(&Row<'_>) -> Result<(), String>) -> Result<(), String> {
         let mut values = StringRecord::new();
-        while self.reader.read_record(&mut values).map_err(in_words)? {
-            let line = values.position().map_or(0, Position::line);
+        while self.reader.read_record(&mut values).map_err(|error| in_words(&error, self.text))? {
+            let line = line_of(values.position(), self.text);
             row(&Row { line, header: &self.header, values: &values })?;
         }
         Ok(())
@@ -89,10 +91,18 @@ impl<'r> Row<'r> {
     }
 }
 
-fn in_words(error: Error) -> String {
+/// The line of a row, which is said to begin where the one before it ends: at empty lines, if there are any.
+fn line_of(position: Option<&Position>, text: &str) -> u64 {
+    let Some(position) = position else { return 0 };
+    let left = text.as_bytes().get(position.byte() as usize..).unwrap_or_default();
+    let empty = left.iter().take_while(|byte| matches!(byte, b'\n' | b'\r')).filter(|byte| **byte == b'\n');
+    position.line() + empty.count() as u64
+}
+
+fn in_words(error: &Error, text: &str) -> String {
     match error.kind() {
         csv::ErrorKind::UnequalLengths { pos, expected_len, len } => {
-            let line = pos.as_ref().map_or(0, Position::line);
+            let line = line_of(pos.as_ref(), text);
             format!("line {line}: {len} values below a header of {expected_len}")
         }
         _ => error.to_string(),

@@ -20,12 +20,16 @@ pub(crate) fn read(path: &Path) -> Result<String> {
 }
 
 fn read_at_most(path: &Path, most: u64) -> Result<String> {
-    let mut text = String::new();
-    let length = File::open(path)?.take(most + 1).read_to_string(&mut text)?;
+    let mut bytes = Vec::new();
+    let length = File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
     if length as u64 > most {
         return Err(Error::new(ErrorKind::FileTooLarge, format!("longer than {} MiB", most >> 20)));
     }
-    Ok(text)
+    String::from_utf8(bytes).map_err(|error| {
+        let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = 1 + good.iter().filter(|byte| **byte == b'\n').count();
+        Error::new(ErrorKind::InvalidData, format!("line {line} is not UTF-8"))
+    })
 }
 
 /// Whether a word is a path rather than a name: one that is there, or looks like one.
@@ -86,6 +90,15 @@ mod tests {
         let error = read_at_most(&folder, (1 << 20) - 1).expect_err("longer");
         std::fs::remove_file(&folder).expect("removed");
         assert_eq!(error.kind(), ErrorKind::FileTooLarge);
+    }
+
+    #[test]
+    fn a_file_in_another_encoding_is_refused_by_its_line() {
+        let file = std::env::temp_dir().join(format!("flockform-latin-{}", std::process::id()));
+        std::fs::write(&file, b"a = 1\n\nb = \"\xe9\"\n").expect("written");
+        let error = read(&file).expect_err("Latin-1");
+        std::fs::remove_file(&file).expect("removed");
+        assert_eq!(error.to_string(), "line 3 is not UTF-8");
     }
 
     #[cfg(unix)]

@@ -51,7 +51,7 @@ pub struct FormationNode {
 }
 
 impl FormationNode {
-    /// Takes part in the domain: for all members, or for one that hears none but itself and its neighbours.
+    /// Takes part in the domain: for all members, or for one, which hears those that [`NodeScope`] says.
     ///
     /// # Errors
     /// Errors of the swarm file or of shared memory.

@@ -61,16 +61,63 @@ impl Deadlines {
     }
 }
 
-/// Sleeps until each deadline, on the computer's monotonic clock.
+/// The schedule of ticks on a clock of which a reading comes now and then: a simulator's. Pure.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Followed {
+    rate: f64,
+    /// Last reading \[s\].
+    last: f64,
+    /// None before the first reading of a run.
+    deadlines: Option<Deadlines>,
+}
+
+impl Followed {
+    fn new(rate: f64) -> Self {
+        Self { rate, last: f64::NEG_INFINITY, deadlines: None }
+    }
+
+    /// The number of ticks that were missed, where one is due at the reading `now` \[s\]. A clock that went back begins anew.
+    fn due(&mut self, now: f64) -> Option<u64> {
+        let last = std::mem::replace(&mut self.last, now);
+        let running = self.deadlines.filter(|_| now >= last);
+        // Half a period off the first reading: steps of about a period, to the rounding of stamps, then bring a tick each.
+        let mut deadlines = running.unwrap_or(Deadlines::new(now - 0.5 / self.rate, self.rate));
+        let due = deadlines.due(now);
+        self.deadlines = Some(deadlines);
+        match due {
+            Due::In(_) => None,
+            Due::Now { missed } => Some(missed),
+        }
+    }
+
+    /// Another rate \[Hz\], from the next tick on.
+    fn set_rate(&mut self, rate: f64) {
+        self.rate = rate;
+        if let Some(deadlines) = &mut self.deadlines {
+            deadlines.set_rate(self.last - 0.5 / rate, rate);
+        }
+    }
+}
+
+/// How often a loop that follows a clock reads it \[s\].
+const LOOK: Duration = Duration::from_millis(1);
+
+/// Sleeps until each deadline, on the computer's monotonic clock or on one that the caller reads.
 pub struct Pace {
     origin: Instant,
     deadlines: Deadlines,
+    followed: Option<Followed>,
 }
 
 impl Pace {
     /// The first tick is due at once; `rate` \[Hz\] above 0.
     pub fn new(rate: f64) -> Self {
-        Self { origin: Instant::now(), deadlines: Deadlines::new(0.0, rate) }
+        Self { origin: Instant::now(), deadlines: Deadlines::new(0.0, rate), followed: None }
+    }
+
+    /// As [`Pace::new`], for [`Pace::follow`].
+    pub fn following(rate: f64) -> Self {
+        Self { followed: Some(Followed::new(rate)), ..Self::new(rate) }
     }
 
     /// Returns the action due now, for a loop that also waits for something else.
@@ -89,8 +136,25 @@ impl Pace {
         }
     }
 
+    /// Sleeps until a tick is due by the clock that `read` reads \[s\], where it has a reading, and returns how many were
+    /// missed before it; at most for a period of the computer's, and `None` where no tick is due by then: there is more to
+    /// be done than ticks. Of a pace that follows no clock, [`Pace::wait`].
+    pub fn follow(&mut self, read: &mut dyn FnMut() -> Option<f64>) -> Option<u64> {
+        loop {
+            let Some(followed) = &mut self.followed else { return Some(self.wait()) };
+            if let Some(missed) = read().and_then(|now| followed.due(now)) {
+                return Some(missed);
+            }
+            match self.due() {
+                Due::In(rest) => std::thread::sleep(Duration::from_secs_f64(rest.max(1e-6)).min(LOOK)),
+                Due::Now { .. } => return None,
+            }
+        }
+    }
+
     /// Another rate \[Hz\], from the next tick on.
     pub fn set_rate(&mut self, rate: f64) {
+        self.followed.iter_mut().for_each(|followed| followed.set_rate(rate));
         self.deadlines.set_rate(self.origin.elapsed().as_secs_f64(), rate);
     }
 
@@ -137,6 +201,37 @@ mod tests {
         }
         let expected = 23.0 * 0.1;
         assert!((begun[19] - expected).abs() < 1e-6, "{}", begun[19]);
+    }
+
+    /// The readings at which ticks are due, and how many were missed.
+    fn followed(rate: f64, readings: impl IntoIterator<Item = f64>) -> (Vec<f64>, u64) {
+        let mut followed = Followed::new(rate);
+        let due: Vec<_> = readings.into_iter().filter_map(|now| Some((now, followed.due(now)?))).collect();
+        (due.iter().map(|(now, _)| *now).collect(), due.iter().map(|(_, missed)| missed).sum())
+    }
+
+    #[test]
+    fn a_followed_clock_brings_a_tick_a_period_of_its_own_and_none_while_it_stands() {
+        // Ten seconds of a clock that stands for a while, read far more often than it moves.
+        let fine = (0..10_000).flat_map(|k| [100.0 + 1e-3 * f64::from(k); 3]);
+        let standing = std::iter::repeat_n(110.0, 5000);
+        let (ticks, missed) = followed(20.0, fine.chain(standing));
+        assert!((200..=201).contains(&ticks.len()) && missed == 0, "{} ticks, {missed} missed", ticks.len());
+        // Steps of a period, as stamps round them and as a busy simulator sends them.
+        let steps: Vec<f64> =
+            (0..1000).map(|k| 0.05 * f64::from(k) + 0.02 * (0.7 * f64::from(k)).sin()).collect();
+        assert_eq!(followed(20.0, steps.clone()), (steps, 0));
+        // What it leaps over is left out, and a new run begins at once.
+        let (ticks, missed) = followed(10.0, [5.0, 5.1, 1005.1, 1005.2, 3.0, 3.1]);
+        assert_eq!((ticks.len(), missed), (6, 9999));
+    }
+
+    #[test]
+    fn another_rate_of_a_followed_clock_begins_one_of_its_periods_later() {
+        let mut one = Followed::new(10.0);
+        assert_eq!(one.due(7.0), Some(0));
+        one.set_rate(100.0);
+        assert_eq!([7.0, 7.004, 7.01, 7.02].map(|now| one.due(now)), [None, None, Some(0), Some(0)]);
     }
 
     #[test]

@@ -56,6 +56,8 @@ impl Gathers {
         let size = |k: usize| list(particles[k]).len();
         let mut sorted: Vec<usize> = (0..particles.len()).collect();
         sorted.sort_by_key(|&k| size(k));
+        // At once: lists that grow take up to twice what they hold.
+        self.index.reserve(sorted.iter().map(|&k| size(k)).sum());
         for alike in sorted.chunk_by(|&a, &b| size(a) == size(b)) {
             let index = self.index.len();
             alike.iter().for_each(|&k| self.index.extend_from_slice(list(particles[k])));

@@ -232,6 +232,41 @@ fn an_unfinished_run_is_in_nobody_s_way_unless_it_is_discarded() {
 
 #[cfg(unix)]
 #[test]
+fn figures_that_nobody_asked_for_until_a_run_is_gone_on_with_are_said_to_be_missing() {
+    let folder = temporary();
+    let endless = ["--set", "stop.steps=100000000", "--checkpoint-every", "1steps", "--figures", "none"];
+    let run =
+        [&["run", "tension", "--out", "o", "--set", "record.figures=[1, 99999999]"][..], &endless].concat();
+    let mut child = start(&run, folder.path());
+    wait_for(&folder.path().join("o.unfinished"));
+    child.kill().expect("kills");
+    child.wait().expect("ends");
+    let mut child = start(&["run", "--resume", "o"], folder.path());
+    let mut said = String::new();
+    let stderr = child.stderr.take().expect("piped");
+    std::io::BufRead::read_line(&mut std::io::BufReader::new(stderr), &mut said).expect("text");
+    child.kill().expect("kills");
+    child.wait().expect("ends");
+    assert!(said.contains("there are none of steps 1\n"), "{said}");
+}
+
+#[test]
+fn what_is_no_run_where_an_unfinished_one_would_be_kept_is_refused_at_the_start() {
+    let folder = temporary();
+    std::fs::create_dir(folder.path().join("o.unfinished")).expect("writable");
+    std::fs::write(folder.path().join("o.unfinished/thesis"), "years of work").expect("writable");
+    for force in [&[][..], &["--force"]] {
+        let output =
+            flockform(&[&["run", "tension", "--steps", "2", "--out", "o"], force].concat(), folder.path());
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains("o.unfinished is in the way") && said.contains("--out"), "{said}");
+    }
+    assert_eq!(names_in(folder.path()), ["o.unfinished"]);
+}
+
+#[cfg(unix)]
+#[test]
 fn a_run_that_still_runs_is_not_resumed_by_another() {
     let folder = temporary();
     let endless = ["--set", "stop.steps=100000000", "--checkpoint-every", "1steps"];

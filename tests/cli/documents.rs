@@ -101,6 +101,37 @@ fn every_command_line_of_readme_and_guides_is_one_of_the_program() {
     assert!(checked > 60, "{checked} command lines were found");
 }
 
+/// Those of other guides take long, or need peers; the exit code is 1 where the guide says so.
+#[test]
+fn the_command_lines_of_the_guide_to_swarms_end_as_it_says() {
+    let guide = include_str!("../../src/guide/swarms.md");
+    let folder = temporary();
+    let mut ran = 0;
+    for line in command_lines(guide) {
+        let line = line.replace("/tmp/", "");
+        let is_quick = ["swarm ", "plan ", "new ", "list "]
+            .iter()
+            .any(|command| line.strip_prefix("flockform ").is_some_and(|rest| rest.starts_with(command)));
+        if !is_quick || line.contains("FILE") {
+            continue;
+        }
+        let shell = line.replacen("flockform", concat!("'", env!("CARGO_BIN_EXE_flockform"), "'"), 1);
+        let output =
+            std::process::Command::new("sh").args(["-c", &shell]).current_dir(folder.path()).output();
+        let output = output.expect("a shell");
+        let expected = if line.contains("ranges=") { 1 } else { 0 };
+        assert_eq!(
+            output.status.code(),
+            Some(expected),
+            "`{line}`: {}{}",
+            text(&output.stdout),
+            text(&output.stderr)
+        );
+        ran += 1;
+    }
+    assert!(ran >= 7, "{ran} were run");
+}
+
 #[test]
 fn no_help_has_an_escape_of_its_source() {
     let helps = helps();

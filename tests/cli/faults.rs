@@ -125,6 +125,68 @@ fn a_body_beyond_the_memory_that_is_there_is_refused_with_both_numbers() {
     assert!(small.status.success(), "{}", text(&small.stderr));
 }
 
+/// 20,000 points in one place see 4e8 others: 3.2 GB of lists, which are counted before there are any.
+#[test]
+fn points_whose_lists_are_beyond_the_memory_that_is_there_are_refused_as_a_body_is() {
+    let folder = temporary();
+    let places =
+        (0..20_000).map(|k| format!("{:e},{:e}\n", 1e-10 * f64::from(k % 200), 1e-10 * f64::from(k / 200)));
+    std::fs::write(folder.path().join("heap.csv"), "x,y\n".to_owned() + &places.collect::<String>())
+        .expect("written");
+    let scene = "title = \"heap\"\nbody = { shape = { kind = \"points\", file = \"heap.csv\" } }\n\
+                 neighbours = { kind = \"within\", radius = 1.5 }\nstop = { steps = 1 }\n";
+    std::fs::write(folder.path().join("heap.toml"), scene).expect("written");
+    let program = command(&[], folder.path()).get_program().to_string_lossy().into_owned();
+    for words in ["run heap.toml --out o", "plan heap.toml"] {
+        let run = format!("ulimit -v 2500000; exec '{program}' {words}");
+        let output =
+            Command::new("sh").args(["-c", &run]).current_dir(folder.path()).output().expect("sh starts");
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{words}: {said}");
+        assert!(said.contains("GiB of memory or more") && said.contains("`ulimit -v`"), "{words}: {said}");
+    }
+    assert_eq!(names_in(folder.path()), ["heap.csv", "heap.toml"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn names_that_are_not_utf_8_are_taken_as_they_are_or_refused_in_words() {
+    use std::ffi::{OsStr, OsString};
+    use std::os::unix::ffi::OsStringExt;
+    let odd = |before: &str, after: &str| {
+        OsString::from_vec([before.as_bytes(), b"\xff", after.as_bytes()].concat())
+    };
+    let folder = temporary();
+    let inside = folder.path().join(odd("in", ""));
+    std::fs::create_dir(&inside).expect("a folder");
+    std::fs::write(inside.join("s.toml"), text(&flockform(&["show", "tension"], folder.path()).stdout))
+        .expect("written");
+    let run = |words: &[&OsStr]| command(&[], &inside).args(words).output().expect("starts");
+    let named = [("--out", odd("o", "")), ("--record", odd("r", ".mcap")), ("--film", odd("f", ".gif"))];
+    let words = ["run", "s.toml", "--steps", "2", "-q"].map(OsStr::new);
+    let options = named.iter().flat_map(|(option, name)| [OsStr::new(*option), name]);
+    let output = run(&words.into_iter().chain(options).collect::<Vec<_>>());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    for (_, name) in &named {
+        assert!(inside.join(name).exists(), "{name:?}");
+    }
+    assert!(inside.join(&named[0].1).join("report.html").is_file());
+    let prefix = odd("p", "");
+    let output = run(&[OsStr::new("install"), OsStr::new("--prefix"), &prefix]);
+    assert!(output.status.success() && inside.join(&prefix).join("setup.bash").is_file());
+    assert_eq!(std::fs::read_dir(&inside).expect("a folder").count(), 5, "nothing else");
+    let (scene, set) = (odd("s", ".toml"), odd("title=", ""));
+    let [tension, key] = ["tension", "--set"].map(OsStr::new);
+    for command in ["run", "compare", "plan"].map(OsStr::new) {
+        for refused in [&[command, &scene][..], &[command, tension, key, &set]] {
+            let output = run(refused);
+            let said = text(&output.stderr);
+            assert_eq!(output.status.code(), Some(2), "{refused:?}: {said}");
+            assert!(said.contains("UTF-8"), "{refused:?}: {said}");
+        }
+    }
+}
+
 #[test]
 fn values_that_overflow_end_as_a_divergence() {
     for pull in ["1e155", "1e200", "1e308"] {

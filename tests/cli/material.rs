@@ -221,6 +221,12 @@ fn scenes_without_fixed_weights_are_refused_with_the_reason() {
 fn options_that_make_no_question_are_refused_with_the_remedy() {
     refused(&[], &["--lattice"]);
     refused(&["tension", "--lattice", "square"], &["cannot be used with"]);
+    let beside = ["--spacing", "--a", "--b", "--angle", "--orientation", "--neighbours", "--weights"];
+    let constants = ["--young", "--poisson", "--shear", "--fiber-angle", "--plane", "--thickness"];
+    for option in beside.into_iter().chain(constants) {
+        let value = if option == "--plane" { "strain" } else { "-7" };
+        refused(&["tension", &format!("{option}={value}")], &["cannot be used with", option]);
+    }
     refused(&["--lattice", "sqare"], &["square"]);
     refused(&["--lattice", "square", "--neighbours", "first:3"], &["not symmetric", "opposite neighbours"]);
     refused(&["--lattice", "square", "--neighbours", "nearest"], &["`nearest`", "first, first:3"]);

@@ -198,7 +198,22 @@ fn a_trade_study_prints_what_is_cheapest_and_writes_every_setting() {
     assert_eq!(table.lines().count() - 1, study["points"].as_array().expect("points").len());
     assert!(table.lines().any(|line| line.starts_with("material,0.5,") && line.contains(",multigrid,")));
     assert!(here.join("trade.png").is_file() && here.join("trade.svg").is_file());
-    run_in(folder.path(), &["trade", "grips", "--quick", "--out", "here", "--force", "--quiet"]);
+    let again = ["trade", "grips", "--quick", "--out", "here", "--force", "--quiet"];
+    run_in(folder.path(), &[&again[..], &["--repeats", "2", "--max-particles", "600"]].concat());
+    let smaller = json_in(&here.join("trade.json"));
+    let particles = |study: &serde_json::Value| {
+        let points = study["points"].as_array().expect("points").iter();
+        points.filter_map(|point| point["particles"].as_u64()).max().expect("some")
+    };
+    assert_eq!([&study["repeats"], &smaller["repeats"]], [1, 2]);
+    assert!(
+        particles(&study) > 600 && particles(&smaller) <= 600,
+        "{} {}",
+        particles(&study),
+        particles(&smaller)
+    );
+    let none = ["trade", "grips", "--quick", "--out", "none", "--max-particles", "1"];
+    refused(&none, &["no setting is left", "--max-particles"]);
 }
 
 #[test]
@@ -414,6 +429,33 @@ fn a_plan_says_what_is_modelled_left_out_and_why() {
     assert!(files(folder.path()).is_empty());
     let said = run_in(folder.path(), &["plan", "tension", "--set", "rule.mean={kind=\"distance\"}"]);
     assert!(said.contains("caution") && said.contains("sequential"), "{said}");
+}
+
+#[test]
+fn what_comes_after_the_last_step_is_warned_of_by_the_plan_and_the_run() {
+    let folder = temporary();
+    let set = [
+        "stop.steps=25",
+        "roles[1].from=99999",
+        "record.figures=[2, 25, 26, 100000]",
+        "actions=[{ at = 3, what = { kind = \"cut\", from = [0, 0], to = [1, 1] } },\
+         { at = 2000, what = { kind = \"cut\", from = [0, 0], to = [1, 1] } }]",
+    ];
+    let set: Vec<&str> = set.iter().flat_map(|text| ["--set", *text]).collect();
+    let words = "caution: beyond the last step, 25, and without effect: roles[1].from = 99999, actions[1].at = 2000, \
+                 record.figures[2] = 26, record.figures[3] = 100000; lower them, or raise stop.steps\n";
+    for command in
+        [&["plan", "tension"][..], &["run", "tension", "--no-report", "--figures", "none", "--out", "o"]]
+    {
+        let said = run_in(folder.path(), &[command, &set].concat());
+        assert!(said.contains(words), "{said}");
+    }
+    let parts = ["--set", "load_steps={ increments = 4 }", "--set", "record.figures=[4, 5]"];
+    let said = run_in(folder.path(), &[&["plan", "elastica"][..], &parts].concat());
+    assert!(
+        said.contains("beyond the last increment, 4, and without effect: record.figures[1] = 5;"),
+        "{said}"
+    );
 }
 
 #[test]

@@ -46,6 +46,12 @@ fn leaders_are_diamonds_on_the_map_and_in_its_legend() {
     };
     let marks = |role: &str| (group(role).matches("<path").count(), group(role).matches("<circle").count());
     assert_eq!([marks("leader"), marks("follower")], [(4, 0), (0, 21)]);
+    // Below each diamond, which lies within, is the robot to scale.
+    assert_eq!(marks("hull"), (0, 4));
+    let radius = |role: &str| {
+        group(role).split(" r=\"").nth(1).and_then(|rest| rest.split('"').next()).map(str::to_owned)
+    };
+    assert!(radius("hull").is_some() && radius("hull") == radius("follower"), "{:?}", radius("hull"));
     let keys: Vec<&str> = map.split("class=\"key\"").skip(1).collect();
     assert!(keys[0].trim_start_matches('>').trim_start().starts_with("<path"), "{}", keys[0]);
 }

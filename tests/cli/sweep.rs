@@ -166,6 +166,12 @@ fn what_cannot_be_swept_is_refused_and_leaves_nothing() {
     sweep(&[&damping[..], &["--outputs", "energies.pe9"]].concat(), &["energies.pe9", "pe1, pe2"]);
     sweep(&[&damping[..], &["--outputs", "energies"]].concat(), &["energies.pe1"]);
     sweep(&[&damping[..], &["--outputs", "probe.999999.x"]].concat(), &["no particle 999999"]);
+    sweep(&[&damping[..], &["--outputs", "probe.67.ux@3"]].concat(), &["the last step is 2", "stop.steps"]);
+    let longer = ["--vary", "stop.steps=[9, 4]", "--outputs", "probe.67.ux@10"];
+    refused(&[&["sweep", "tension"], &longer[..]].concat(), &["the last step is 9"]);
+    let both = [&damping[..], &["--set", "update.damping=0.1"]].concat();
+    sweep(&both, &["--set: `update.damping=0.1` has no effect", "--vary"]);
+    sweep(&["--vary", "roles[1].motion=[1, 2]", "--set", "roles.1.motion.kind=velocity"], &["has no effect"]);
     // The first run is refused, the last shows what there is.
     let refused_first = ["--vary", "update.damping=[-1, 0.5]"];
     sweep(&[&refused_first[..], &["--outputs", "energies.pe9"]].concat(), &["energies.pe9", "pe1, pe2"]);

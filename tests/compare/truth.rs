@@ -23,6 +23,24 @@ const LATTICES: [&str; 6] = [
     "lattice={ kind = \"honeycomb\", spacing = 0.7 }",
 ];
 
+/// However it is written, a push is one point of the truth's mesh; what single points push has no truth, and that is said.
+#[test]
+fn forces_that_push_one_particle_are_one_and_are_warned_of() {
+    let entry = "{ kind = \"force\", region = { kind = \"edge\", side = \"right\" }, force = [0.0, -0.005] }";
+    let [once, often] = [1, 20].map(|times| {
+        let whole = entry.replace("0.005", &format!("{:?}", 0.1 / f64::from(times)));
+        compared("beam-loaded", &[&format!("loads=[{}]", vec![whole; times as usize].join(", "))])
+    });
+    let [a, b] = [&once, &often].map(|found| found.reference.solution.strain_energy());
+    assert!((a / b - 1.0).abs() < 1e-9, "{a} and {b}");
+    assert!(
+        once.cautions.iter().any(|caution| caution.contains("loads[0] pushes single points")),
+        "{:?}",
+        once.cautions
+    );
+    assert_eq!(compared("beam-loaded", &[]).cautions, [""; 0]);
+}
+
 #[test]
 fn the_truth_is_the_same_on_every_lattice() {
     let corner = |found: &SceneReference| {

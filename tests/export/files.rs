@@ -464,16 +464,16 @@ fn a_body_of_very_many_particles_makes_a_small_figure() {
 #[test]
 fn probes_are_drawn_as_one_line_each_in_the_panels_where_something_happens() {
     // Pulled along x alone, nothing happens along y; pulled obliquely, something does.
-    for (pull, panels) in [("[0.6, 0.0]", 2), ("[0.6, 0.1]", 3)] {
+    for (pull, panels) in [("[0.6, 0.0]", 3), ("[0.6, 0.1]", 4)] {
         let pull = format!("roles[1].motion.per_step={pull}");
         let run = Run::of("tension", &["stop.steps=50", "record.figures=[]", &pull]);
         let svg = figures::probes(&run.subject(), &run.probes);
         let figure = Document::parse(&svg).expect("well-formed");
-        assert_eq!(groups(&figure, "probe").count(), 2 * panels);
+        assert_eq!(groups(&figure, "series").count(), 2 * panels);
         let labels = |id: &str| figure.descendants().filter(|node| node.text() == Some(id)).count();
-        assert!(svg.contains("PE1 [unit²]"));
-        // An element and its text node each.
-        assert_eq!((labels("67"), labels("115")), (2 * panels, 2 * panels));
+        assert!(svg.contains("PE1 [unit²]") && svg.contains("PE2 [unit]"));
+        // In the legend, an element and its text node each.
+        assert_eq!((labels("67"), labels("115")), (2, 2));
     }
 }
 

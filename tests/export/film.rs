@@ -191,13 +191,16 @@ fn a_film_of_a_flight_ends_with_the_robots_in_their_last_places() {
 fn what_cannot_become_a_film_is_refused_before_the_run() {
     let folder = temporary();
     std::fs::write(folder.path().join("notes.gif"), "not a film").expect("writable");
-    let refusals: [(&[&str], &str); 9] = [
+    let refusals: [(&[&str], &str); 12] = [
         (&["--film", "sheet.avi"], ".gif, .mp4 or .webm"),
         (&["--film", "sheet"], ".gif, .mp4 or .webm"),
         (&["--film", "notes.gif"], "--force"),
         (&["--film", "notes.gif", "--force"], "is no film"),
         (&["--film", "nowhere/sheet.gif"], "no folder"),
         (&["--film", "o/sheet.gif"], "results alone"),
+        (&["--film", "nowhere/../o/sheet.gif"], "results alone"),
+        (&["--record", "o/sheet.mcap"], "results alone"),
+        (&["--record", "o"], "results alone"),
         (&["--film", "sheet.gif", "--film-colour", "von-mises"], "no material"),
         (
             &["--film", "sheet.gif", "--film-colour", "clearance"],

@@ -11,6 +11,32 @@ fn slice(poisson: f64) -> String {
     )
 }
 
+/// In plane stress with the same Lame constants displacements are the same, so that what locks in one locks in the other.
+#[test]
+fn plane_stress_near_one_is_plane_strain_near_one_half() {
+    let body = format!(
+        "{OUTLINE}\nroles = [{{ region = {{ kind = \"outline\", pieces = [4] }}, role = \"clamped\" }}]\n\
+         loads = [{{ kind = \"traction\", region = {{ kind = \"outline\", pieces = [2] }}, traction = [0.0, 1.0] }}]"
+    );
+    for kind in ["square", "hexagonal", "honeycomb"] {
+        let poisson = 0.99;
+        let shear = 1000.0 / (2.0 * (1.0 + poisson));
+        let slanted = poisson / (1.0 + poisson);
+        let sheets = [("stress", 1000.0, poisson), ("strain", 2.0 * shear * (1.0 + slanted), slanted)];
+        let [thin, thick] = sheets.map(|(plane, young, poisson)| {
+            let material = format!(
+                "material = {{ kind = \"isotropic\", young = {young:?}, poisson = {poisson:?}, plane = \"{plane}\" }}"
+            );
+            let scene = scene(&lattice(kind, 2.0, 0.0), &format!("{material}\n{body}"));
+            solved(&scene.unwrap_or_else(|error| panic!("{error}"))).1.engine.displacements()
+        });
+        let largest = thick.iter().map(|u| u[0].hypot(u[1])).fold(0.0, f64::max);
+        let apart = thin.iter().zip(thick.iter()).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]));
+        let apart = apart.fold(0.0, f64::max);
+        assert!(apart < 1e-6 * largest, "{kind}: {apart} of {largest}");
+    }
+}
+
 fn led(pieces: &str, motion: &str) -> String {
     format!(
         "{{ region = {{ kind = \"outline\", pieces = [{pieces}] }}, role = \"leader\", motion = {motion} }}"

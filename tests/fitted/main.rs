@@ -9,6 +9,7 @@ mod inclusions;
 mod iterations;
 mod locking;
 mod outlines;
+mod pushed;
 mod rollers;
 #[path = "../common/scenes.rs"]
 mod scenes;

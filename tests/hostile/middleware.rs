@@ -330,6 +330,31 @@ fn a_process_that_is_killed_or_stands_still_is_followed_by_one_that_goes_on() {
 }
 
 /// As an update does while the swarm flies.
+/// Silence after which the peers of a process count as lost, and more.
+const SILENCE: Duration = Duration::from_secs(4);
+
+#[test]
+fn robots_whose_node_has_taken_leave_wait_for_another_and_a_node_for_other_robots() {
+    let mut scene = Scene::open(&LONG);
+    let lines = scene.robots.lines();
+    assert_eq!(scene.node.terminate(), Some(0));
+    std::thread::sleep(SILENCE);
+    let said: Vec<String> = lines.try_iter().collect();
+    assert!(said.iter().any(|line| line.contains("all peers have left")), "{said:#?}");
+    let ended = ["given up", "ended with code"];
+    assert!(!said.iter().any(|line| ended.iter().any(|words| line.contains(words))), "{said:#?}");
+
+    scene.node = Running::start(&mut command(scene.domain, &arguments("node", &LONG)));
+    let lines = scene.node.lines();
+    assert!(scene.judge.until_all_are_sent().is_finite(), "another node flies them");
+    assert_eq!(scene.robots.terminate(), Some(0));
+    std::thread::sleep(SILENCE);
+    let said: Vec<String> = lines.try_iter().collect();
+    assert!(said.iter().any(|line| line.contains("all peers have left")), "{said:#?}");
+    assert!(!said.iter().any(|line| ended.iter().any(|words| line.contains(words))), "{said:#?}");
+    assert_eq!(scene.node.terminate(), Some(0));
+}
+
 #[test]
 fn a_program_whose_file_is_removed_or_replaced_goes_on_when_its_worker_dies() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -46,7 +46,8 @@ fn robots_of_a_peer_fly_the_manoeuvre_that_the_node_leads() {
 #[test]
 #[ignore = "needs the cyclonedds package of PyPI: see the head of tests/interop/main.rs"]
 fn a_member_s_own_node_hears_its_neighbours_alone_and_takes_its_robot_to_where_they_lead_it() {
-    let (square, domain) = (Square::new(&[&PATIENT, &SHORT, &["control.sweeps=1"]]), domain());
+    let alone = ["control.sweeps=1", "node.hears=\"neighbours\""];
+    let (square, domain) = (Square::new(&[&PATIENT, &SHORT, &alone]), domain());
     let _node = square.start(domain, "node", &["--member", "robot_7"]);
     // Everybody else stands where the formation would be, moved: robot_7 alone has to catch up.
     let away = |place: [f64; 2]| [place[0] + 0.5, place[1] - 0.25];

@@ -7,6 +7,29 @@ use super::pages::{Viewer, address, start};
 use super::strangers::PATIENCE;
 use super::waits::within;
 
+/// A key that names a pipe, which nothing ever comes out of.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_a_session_that_is_busy_and_leaves_nothing_half_written() {
+    let folder = temporary();
+    let pipe = folder.path().join("pipe.csv");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().expect("starts").success());
+    let mut program = start(&["live", "tension", "--record", "live.mcap"], folder.path());
+    let (host, token) = address(folder.path());
+    let mut viewer = within(PATIENCE, "a viewer is let in", || Viewer::enter(&host, &token));
+    let motion = "{ kind = \"csv\", file = \"pipe.csv\", steps = 5 }";
+    viewer.ask(&json!({ "do": "set", "key": "roles[1].motion", "value": motion }));
+    // Returns when the session has opened the other end.
+    let _other_end = std::fs::File::options().write(true).open(&pipe).expect("a pipe");
+    let since = std::time::Instant::now();
+    assert_eq!(program.terminate(), Some(1));
+    assert!(since.elapsed().as_secs() < 10, "{:?}", since.elapsed());
+    let files: Vec<_> = std::fs::read_dir(folder.path()).expect("a folder").flatten().collect();
+    let mut names: Vec<_> = files.iter().map(|file| file.file_name()).collect();
+    names.sort();
+    assert_eq!(names, ["pipe.csv", "printed"]);
+}
+
 #[test]
 fn the_page_shows_the_command_with_what_was_set() {
     for (name, key, more) in

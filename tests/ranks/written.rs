@@ -178,6 +178,16 @@ pub(super) const SEVERAL: &str = "loads=[{kind=\"pressure\",region={kind=\"outli
      {kind=\"force\",region={kind=\"disc\",centre=[17.0,6.0],radius=2.0},force=[0.5,-1.5]},\
      {kind=\"body\",force=[0.1,-0.7]}]";
 
+/// Its one column is the last rank's: the first has no row to know the columns' names from.
+#[test]
+fn a_table_has_its_header_where_the_first_rank_has_no_particle() {
+    let text = "title=\"column\"\nlattice={kind=\"square\",spacing=1.0}\nbody={shape={kind=\"grid\",columns=1,rows=24}}\n\
+        stop={steps=8}\nrecord={vtk_every=4}\nroles=[{region={kind=\"edge\",side=\"bottom\"},role=\"clamped\"},\
+        {region={kind=\"edge\",side=\"top\"},role=\"leader\",motion={kind=\"velocity\",per_step=[0.0,0.01]}}]";
+    let [_, table, _] = assert_tables_the_same(&plate(text, &[]));
+    assert!(table.starts_with("id,column,row,role,X,Y,") && table.lines().count() == 25, "{table}");
+}
+
 #[test]
 fn what_a_growing_load_does_to_a_body_in_parts_is_what_it_does_to_one_alone() {
     let fitted = "body.outline=\"fitted\"";

@@ -64,6 +64,26 @@ fn a_recording_that_breaks_off_is_replayed_as_far_as_it_goes() {
     std::fs::write(&path, &bytes[..bytes.len() / 2]).expect("cut");
     let report = replay_file(&path, None, &[], 0.0).expect("readable");
     assert!(report.damage.is_some() && report.holds() && report.ticks > 10, "{report:?}");
+    let said = says(1, &["replay", "flight.mcap"], folder.path());
+    assert!(said.contains("breaks off") && said.contains("is not replayed"), "{said}");
+    // Before the swarm file is whole, and before the first message is.
+    let of_first_chunk = {
+        let mut bytes = bytes.clone();
+        let at = bytes.windows(4).position(|four| four == b"zstd").expect("compressed") + 4 + 8 + 100;
+        bytes[at] ^= 0xff;
+        bytes
+    };
+    for (bytes, words) in [(&bytes[..300], "does not say which swarm"), (&of_first_chunk[..], "no poses")] {
+        std::fs::write(&path, bytes).expect("damaged");
+        let said = says(2, &["replay", "flight.mcap"], folder.path());
+        let (damage, blamed) =
+            (said.find("breaks off").expect("the damage"), said.find(words).expect("words"));
+        assert!(damage < blamed, "{said}");
+    }
+    // Behind the last message nothing is lost.
+    let end = bytes.len() - mcap::MAGIC.len() - 40;
+    std::fs::write(&path, &bytes[..end]).expect("cut");
+    assert!(says(0, &["replay", "flight.mcap"], folder.path()).contains("within"));
 }
 
 #[test]

@@ -35,7 +35,7 @@ proptest! {
 
     #[test]
     fn any_environment_is_read_or_refused(value in any::<String>()) {
-        let _ = RosArguments::parse([], &|_| Some(value.clone()));
+        let _ = RosArguments::parse::<String>([], &|_| Some(value.clone()));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use flockform::ros::arguments::{DiscoveryRange, Environment, RosArgumentError, R
 /// The environment in which exactly these variables are set.
 fn environment(set: &[(&str, &str)]) -> Result<Environment, RosArgumentError> {
     let look_up = |name: &str| set.iter().find(|(key, _)| *key == name).map(|(_, value)| value.to_string());
-    RosArguments::parse([], &look_up).map(|(_, ros)| ros.environment)
+    RosArguments::parse::<String>([], &look_up).map(|(_, ros)| ros.environment)
 }
 
 #[test]

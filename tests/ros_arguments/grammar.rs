@@ -1,6 +1,6 @@
 //! Which arguments are ROS ones, what they say, and what is refused.
 
-use flockform::ros::arguments::Severity;
+use flockform::ros::arguments::{RosArgumentError, RosArguments, Severity};
 
 use crate::{parse, refusal, ros, words};
 
@@ -21,6 +21,26 @@ fn ordinary_arguments_stay_and_keep_their_order() {
     ] {
         assert_eq!(parse(&words(line)).expect(line).0, words(rest), "{line}");
     }
+}
+
+#[cfg(unix)]
+#[test]
+fn arguments_that_are_not_utf_8_stay_as_they_are_and_are_no_rules() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let odd = OsStr::from_bytes(b"o\xff");
+    let read = |line: &[&'static str]| {
+        let all = line.iter().map(|word| if *word == "ODD" { odd } else { OsStr::new(*word) });
+        RosArguments::parse(all, &|_| None)
+    };
+    let (rest, ros) = read(&["node", "ODD", "--ros-args", "-r", "a:=b"]).expect("read");
+    assert_eq!((rest, ros.remaps.len()), (vec![OsStr::new("node"), odd], 1));
+    for flag in ["-r", "-p", "--log-level", "-e"] {
+        let error = read(&["--ros-args", flag, "ODD"]).expect_err("no rule").to_string();
+        assert!(error.contains(flag) && error.contains("not UTF-8"), "{error}");
+    }
+    let error = read(&["--ros-args", "--params-file", "ODD"]).expect_err("not there");
+    assert!(matches!(&error, RosArgumentError::ReadFile { path, .. } if path.as_os_str() == odd), "{error}");
 }
 
 #[test]

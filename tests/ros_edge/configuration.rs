@@ -148,6 +148,18 @@ fn a_topic_with_two_uses_is_refused() {
     assert!(fed_back.contains("targets of") && fed_back.contains("places of"), "{fed_back}");
     let velocities = refusal(&["node.velocity=\"twist\"", "node.velocity_topic=\"/cmd_vel\""], &[]);
     assert!(velocities.contains("velocities of"), "{velocities}");
+    // A node that hears itself on its emergency stop would stop for ever.
+    for own in
+        ["~/state", "~/markers", "/diagnostics", "/parameter_events", "robot_1/target_pose", "/robot_25/pose"]
+    {
+        let heard = refusal(&[&format!("node.emergency_stop_topic={own:?}")], &[]);
+        assert!(heard.contains("has two uses: "), "{own}: {heard}");
+    }
+    let file = square(&[&PATIENT[..], &["node.emergency_stop_topic=\"/rosout\""]].concat());
+    let mut node = FormationNode::open(&file, &arguments(&[]), None).expect("without a log");
+    let heard = node.publish_log(std::sync::mpsc::channel().1).expect_err("two uses").to_string();
+    assert!(heard.contains("topic /rosout has two uses: Log of this node"), "{heard}");
+    drop(node);
     // Without leaders moved by topic and without velocities those topics are not used.
     let unused = ["-p", "leader_topic:=/places", "-p", "velocity_topic:=/places"];
     drop(Swarming::open(&square(&PATIENT), &unused));

@@ -203,7 +203,7 @@ fn a_message_stops_everybody_where_the_file_allows_it() {
 #[test]
 fn a_member_s_own_node_hears_its_neighbours_alone_and_moves_nobody_else() {
     let _peers = peers();
-    let mut overrides = vec!["control.sweeps=1"];
+    let mut overrides = vec!["control.sweeps=1", "node.hears=\"neighbours\""];
     overrides.extend(PATIENT);
     let swarm = square(&overrides);
     let mut robots = RobotNodes::open(&swarm, &arguments(&[]), Layout::OneNode).expect("robots");

@@ -1,7 +1,8 @@
 //! Every way in and out of the formation's node: types of poses, leaders moved by topic, velocities, simulated time.
 
 use std::collections::BTreeSet;
-use std::time::Duration;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
 
 use flockform::flock::vectors::distance;
 use flockform::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
@@ -246,6 +247,35 @@ fn a_node_without_the_clock_that_it_is_to_go_by_says_so_until_one_comes() {
         clock.publish(&message).expect("sent");
     };
     until("no word about the clock", || status(&mut tell).filter(|status| !misses(status)));
+    let ceased = until("a word about the clock that ceased", || status(&mut || {}).filter(|one| misses(one)));
+    assert!(ceased.message.contains("for three seconds"), "{}", ceased.message);
+}
+
+#[test]
+fn a_node_ticks_as_its_simulator_s_time_goes_on_and_rests_while_it_stands() {
+    let peers = peers();
+    let keeper = peers.theirs.node("/", "slow_time_keeper").expect("a node");
+    let clock = keeper.publisher::<Clock>("/slow/clock", Quality::BEST_EFFORT).expect("out");
+    let remapped = [&SIMULATED[..], &["-r", "/clock:=/slow/clock"]].concat();
+    let swarm = square(&PATIENT);
+    let mut node = FormationNode::open(&swarm, &arguments(&remapped), None).expect("a node");
+    // A reading that is lost is sent again: the node looks around at least once in a period of the computer's.
+    let (mut time, mut steps, mut turns_at_rest) = (100.0, 1, 0);
+    let begun = Instant::now();
+    node.run_while(&AtomicBool::new(false), &mut |node| {
+        let ticks = node.control().ticks();
+        assert!(ticks <= steps, "{ticks} ticks in {steps} periods of the simulator");
+        assert!(begun.elapsed() < PATIENCE, "{ticks} ticks in {steps} periods of the simulator");
+        match (ticks == steps, steps < 50) {
+            (true, true) => (time, steps) = (time + swarm.raw.control.period, steps + 1),
+            (true, false) => turns_at_rest += 1,
+            (false, _) => {}
+        }
+        let message = Clock { clock: builtin_interfaces::Time::from_seconds(time) };
+        clock.publish(&message).expect("sent");
+        turns_at_rest < 50
+    });
+    assert_eq!(node.control().ticks(), steps);
 }
 
 #[test]

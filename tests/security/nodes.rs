@@ -40,7 +40,8 @@ fn a_process_of_its_own() {
         STOP.store(true, Ordering::Relaxed);
     });
     let swarm = load_swarm("square", &[]);
-    let (_, arguments) = RosArguments::parse([], &|name| std::env::var(name).ok()).expect("a sound enclave");
+    let (_, arguments) =
+        RosArguments::parse::<String>([], &|name| std::env::var(name).ok()).expect("a sound enclave");
     assert!(arguments.security.enclave.is_some());
     let is_well = if part == "node" {
         let mut node = FormationNode::open(&swarm, &arguments, None).expect("admitted");

@@ -96,6 +96,51 @@ fn every_model_of_a_robot_brings_the_formation_home() {
     }
 }
 
+#[test]
+fn unicycles_start_however_short_the_first_step_is_that_their_acceleration_allows() {
+    // 0.1 mm in a period.
+    let overrides = [
+        "limits.acceleration=1.0",
+        "control.period=0.01",
+        "flight.model={ kind = \"unicycle\", turn_rate = 90.0 }",
+        "flight.bounds={}",
+        "flight.duration=14.0",
+    ];
+    let (_, report) = flown(&load_swarm("square", &overrides));
+    assert!(report.way[0] > 2.0, "{:?}", report.way);
+    let [largest, _] = report.affine_error.expect("affine");
+    assert!(largest < 0.5, "{largest}");
+}
+
+#[test]
+fn robots_whose_acceleration_is_limited_get_around_each_other() {
+    // Detours begin at rest, where the straight way has no room at all.
+    let angle = |k: u32| std::f64::consts::TAU * (f64::from(k) / 16.0 + 0.01);
+    let robot = |k: u32| {
+        let [x, y] = [4.0 * angle(k).cos(), 4.0 * angle(k).sin()];
+        format!("{{ name = \"r{k}\", place = [{x:.6}, {y:.6}] }}")
+    };
+    let list = |one: &dyn Fn(u32) -> String| (0..16).map(one).collect::<Vec<_>>().join(", ");
+    let crossing = |model: &str| {
+        format!(
+            "title = \"crossing\"\nradius = 0.2\nlinks = {{ kind = \"nearest\", count = 2 }}\nrobots = [{}]\n\
+             control = {{ period = 0.1 }}\nlimits = {{ speed = 1.0, acceleration = 1.0, clearance = 0.1 }}\n\
+             [[leaders]]\nrobots = [{}]\nprogram = {{ kind = \"manoeuvre\", name = \"swap\" }}\n\
+             [[manoeuvres]]\nname = \"swap\"\nabout = [0.0, 0.0]\n\
+             legs = [{{ seconds = 0.001, stretch = [-1.0, -1.0] }}]\n\
+             [flight]\nduration = 120.0\nmodel = {{ kind = \"{model} }}\n",
+            list(&robot),
+            list(&|k| format!("\"r{k}\""))
+        )
+    };
+    for model in ["integrator\"", "unicycle\", turn_rate = 90.0"] {
+        let (_, report) = flown(&parse(&crossing(model)).unwrap_or_else(|error| panic!("{error}")));
+        let [_, last] = report.affine_error.expect("affine");
+        assert!(last < 0.01, "{model}: {last}");
+        assert!(report.clearance.expect("others") >= 0.1 - 1e-9, "{model}: {:?}", report.clearance);
+    }
+}
+
 /// Two robots in a row, the first led over 10 m in 20 s.
 const ROW: &str = "title = \"row\"\nradius = 0.2\nlinks = { kind = \"nearest\", count = 1 }\n\
     robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [-1.5, 0.0] }]\n\
@@ -139,6 +184,23 @@ fn a_flight_whose_leader_or_whose_poses_never_arrive_has_no_final_error_that_hol
         let [verdict] = &report.bounds[..] else { panic!("{:?}", report.bounds) };
         assert!(!verdict.holds, "{fault}: {verdict:?}");
         assert_eq!(verdict.found.is_some(), found, "{fault}: {verdict:?}");
+    }
+}
+
+#[test]
+fn a_flight_that_ends_before_its_programs_neither_settles_nor_has_a_final_error() {
+    let bounds = "[flight.bounds]\nfinal_error = 100.0\nsettling_time = 100.0\n";
+    for (seconds, ended) in [(10.0, false), (19.9, false), (20.0, true), (30.0, true)] {
+        let text = format!("{ROW}{bounds}").replace("duration = 30.0", &format!("duration = {seconds:?}"));
+        let (_, report) = flown(&parse(&text).unwrap_or_else(|error| panic!("{error}")));
+        let facts = report.facts(|number| number.to_string());
+        let (_, settled) = facts.iter().find(|(name, _)| *name == "Settling time").expect("said");
+        assert_eq!(settled.starts_with("not measured"), !ended, "{seconds} s: {settled}");
+        assert_eq!(report.bounds.len(), 2);
+        for verdict in &report.bounds {
+            let is_measured = ended && (verdict.bound == "final_error" || report.settling_time.is_some());
+            assert_eq!((verdict.holds, verdict.found.is_some()), (is_measured, is_measured), "{verdict:?}");
+        }
     }
 }
 

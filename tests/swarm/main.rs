@@ -2,6 +2,7 @@
 
 #![cfg(all(feature = "export", feature = "swarm"))]
 
+mod alone;
 mod bridge;
 mod faults;
 mod files;

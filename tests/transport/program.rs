@@ -58,7 +58,8 @@ fn the_loop_over_shared_memory_flies_what_the_simulated_flight_flies() {
 #[test]
 fn a_member_s_own_node_hears_its_neighbours_alone_and_moves_nobody_else() {
     let shm = domain(&domain_name());
-    let swarm = load_swarm("square", &[&OVERRIDES[..], &["control.sweeps=1"]].concat());
+    let near = ["control.sweeps=1", "node.hears=\"neighbours\""];
+    let swarm = load_swarm("square", &[&OVERRIDES[..], &near].concat());
     let mut robots = SimulatedRobots::open(&swarm, &shm).expect("robots");
     let mut node = FormationNode::open(&swarm, &shm, Some("robot_7")).expect("a node");
     for _ in 0..20 {

@@ -13,7 +13,7 @@ use flockform::engine::Engine;
 use flockform::engine::observer::Observer;
 use flockform::export::sweep::{Journal, Output, OutputError, Probed, Row, Values};
 use flockform::export::{ExportError, Measured, Summary, Timings};
-use flockform::scene::SceneError;
+use flockform::scene::{Scene, SceneError};
 use flockform::solve::interrupt::Interrupt;
 use flockform::study::compare::run::plan;
 use flockform::study::design::Design;
@@ -87,6 +87,25 @@ impl Runs<'_> {
             Some(error) => Err(error.clone().into()),
             None => Ok(ended.into_iter().filter_map(|(run, ended)| self.row(run, ended)).collect()),
         }
+    }
+
+    /// Refuses outputs of steps that no run can come to, as far as that is known before they are made.
+    ///
+    /// # Errors
+    /// Names the first such output, and the last step of the longest run.
+    pub fn require_reached(&self) -> Result<(), Refusal> {
+        let factors = &self.design.factors;
+        let decides =
+            |key: &str| ["stop", "load_steps", "equilibrium"].iter().any(|table| key.starts_with(table));
+        let of_steps = factors.iter().position(|factor| factor.key == "stop.steps");
+        if factors.iter().enumerate().any(|(k, factor)| Some(k) != of_steps && decides(&factor.key)) {
+            return Ok(());
+        }
+        let steps = |run: &usize| of_steps.and_then(|k| self.design.runs[*run][k].number).unwrap_or(0.0);
+        let longest = (0..self.design.runs.len()).max_by(|a, b| steps(a).total_cmp(&steps(b)));
+        let scene = longest.and_then(|run| self.scene.load_scene(&self.design.overrides(run)).ok());
+        let reached = |scene: Scene| self.outputs.iter().try_for_each(|output| output.require_within(&scene));
+        Ok(scene.map_or(Ok(()), reached)?)
     }
 
     /// Makes these runs after those that are done, and adds each to the journal as it ends; an interrupt leaves out those under way.

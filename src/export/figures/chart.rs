@@ -10,12 +10,14 @@ use super::svg::{Anchor, INK, Path, Svg};
 use super::ticks::{Ticks, power_of_ten};
 
 const HEIGHT: f64 = 430.0;
+const PANEL_HEIGHT: f64 = 190.0;
+const PANEL_GAP: f64 = 16.0;
 const RIGHT: f64 = 26.0;
 const TEXT: f64 = 12.0;
 const TICK: f64 = 5.0;
 const GRID: &str = "#e6e8eb";
 
-/// Points of a line that a page can show; a longer one keeps the extremes of each stretch.
+/// Points of a line that a page or a sheet can show; a longer one keeps the extremes of each stretch.
 const MOST_POINTS: usize = 1500;
 
 /// The quantity of an axis, and its scale.
@@ -119,6 +121,22 @@ pub fn draw(chart: &Chart) -> String {
     svg.finish()
 }
 
+/// Draws charts of the same series against the same quantity as panels of one sheet, under this title and one legend.
+pub fn draw_panels(title: &str, charts: &[Chart]) -> String {
+    let heading = Heading { title: title.into(), ..charts.first().map(heading).unwrap_or_default() };
+    let top = heading.height(page::WIDTH) + 4.0;
+    let below = |n: usize| n as f64 * (PANEL_HEIGHT + PANEL_GAP);
+    let mut svg = Svg::new(page::WIDTH, top + below(charts.len()) - PANEL_GAP + Axes::BELOW);
+    heading.draw(&mut svg, page::WIDTH);
+    let windows: Vec<Axes> = charts.iter().map(|chart| window(chart, PANEL_HEIGHT)).collect();
+    let rooms = charts.iter().zip(&windows).map(|(chart, axes)| room_on_the_left(chart, axes));
+    let left = rooms.fold(0.0, f64::max);
+    for (n, (chart, axes)) in charts.iter().zip(windows).enumerate() {
+        draw_plot(&mut svg, chart, axes, [left, top + below(n)], n + 1 == charts.len());
+    }
+    svg.finish()
+}
+
 /// Draws several charts on one sheet, in this order from the top.
 pub fn draw_below_each_other(charts: &[Chart]) -> String {
     let mut svg = Svg::new(page::WIDTH, charts.iter().map(height).sum());
@@ -150,15 +168,18 @@ fn heading(chart: &Chart) -> Heading {
 }
 
 fn draw_on(svg: &mut Svg, chart: &Chart) {
-    let heading = heading(chart);
-    let top = heading.height(page::WIDTH) + 4.0;
-    let mut axes = window(chart);
-    let left = room_on_the_left(chart, &axes);
-    axes.corner = [left, top];
-    axes.size = [page::WIDTH - left - RIGHT, HEIGHT];
+    let (heading, axes) = (heading(chart), window(chart, HEIGHT));
     heading.draw(svg, page::WIDTH);
-    draw_horizontal(svg, &chart.x, &axes);
-    draw_vertical(svg, &chart.y, &axes, left);
+    let corner = [room_on_the_left(chart, &axes), heading.height(page::WIDTH) + 4.0];
+    draw_plot(svg, chart, axes, corner, true);
+}
+
+/// The chart without its heading, and without what its horizontal axis says if that stands elsewhere.
+fn draw_plot(svg: &mut Svg, chart: &Chart, mut axes: Axes, corner: [f64; 2], has_labels: bool) {
+    axes.corner = corner;
+    axes.size[0] = page::WIDTH - corner[0] - RIGHT;
+    draw_horizontal(svg, &chart.x, &axes, has_labels);
+    draw_vertical(svg, chart, &axes);
     for landmark in &chart.landmarks {
         draw_landmark(svg, chart, &axes, landmark);
     }
@@ -178,8 +199,8 @@ fn on_axes(chart: &Chart, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
     Some([on_axis(&chart.x, x)?, on_axis(&chart.y, y)?])
 }
 
-/// The axes around everything shown, their place still to be given.
-fn window(chart: &Chart) -> Axes {
+/// The axes around everything shown, so high \[px\], their place still to be given.
+fn window(chart: &Chart, height: f64) -> Axes {
     let shown = || chart.series.iter().flat_map(|s| &s.points).filter_map(|&p| on_axes(chart, p));
     let marked: Vec<f64> = chart.landmarks.iter().filter_map(|m| on_axis(&chart.x, m.x)).collect();
     let range = |k: usize| {
@@ -188,13 +209,14 @@ fn window(chart: &Chart) -> Axes {
         match (low.is_finite(), high - low) {
             (false, _) => [0.0, 1.0],
             (true, extent) if extent > 1e-9 * low.abs().max(1e-300) => {
-                [low - 0.05 * extent, high + 0.05 * extent]
+                let margin = if k == 0 && chart.follows_clock { 0.0 } else { 0.05 * extent };
+                [low - margin, high + margin]
             }
             _ => [low - 0.5, high + 0.5],
         }
     };
     let [x, y] = [range(0), range(1)];
-    Axes { corner: [0.0; 2], size: [page::WIDTH, HEIGHT], low: [x[0], y[0]], high: [x[1], y[1]] }
+    Axes { corner: [0.0; 2], size: [page::WIDTH, height], low: [x[0], y[0]], high: [x[1], y[1]] }
 }
 
 /// Positions of ticks as the axes count, with their labels (none for a minor tick).
@@ -227,7 +249,7 @@ fn ticks(axis: &Axis, low: f64, high: f64, most: f64) -> (Vec<(f64, String)>, St
 }
 
 fn vertical_ticks(chart: &Chart, axes: &Axes) -> (Vec<(f64, String)>, String) {
-    ticks(&chart.y, axes.low[1], axes.high[1], 9.0)
+    ticks(&chart.y, axes.low[1], axes.high[1], (axes.size[1] / 34.0).min(9.0))
 }
 
 fn room_on_the_left(chart: &Chart, axes: &Axes) -> f64 {
@@ -236,7 +258,7 @@ fn room_on_the_left(chart: &Chart, axes: &Axes) -> f64 {
     widest + TICK + 36.0
 }
 
-fn draw_horizontal(svg: &mut Svg, axis: &Axis, axes: &Axes) {
+fn draw_horizontal(svg: &mut Svg, axis: &Axis, axes: &Axes, has_labels: bool) {
     let (marks, name) = ticks(axis, axes.low[0], axes.high[0], 10.0);
     let bottom = axes.corner[1] + axes.size[1];
     for (value, label) in &marks {
@@ -244,16 +266,20 @@ fn draw_horizontal(svg: &mut Svg, axis: &Axis, axes: &Axes) {
         let long = if label.is_empty() { 0.5 * TICK } else { TICK };
         if !label.is_empty() {
             svg.group(format_args!("stroke=\"{GRID}\""), |svg| svg.line([x, axes.corner[1]], [x, bottom]));
-            svg.text([x, bottom + 15.0], Anchor::Middle, TEXT, INK, label);
+            if has_labels {
+                svg.text([x, bottom + 15.0], Anchor::Middle, TEXT, INK, label);
+            }
         }
         svg.group(format_args!("stroke=\"{INK}\""), |svg| svg.line([x, bottom], [x, bottom + long]));
     }
     let middle = axes.corner[0] + axes.size[0] / 2.0;
-    svg.text([middle, bottom + 37.0], Anchor::Middle, TEXT + 1.0, INK, &name);
+    if has_labels {
+        svg.text([middle, bottom + 37.0], Anchor::Middle, TEXT + 1.0, INK, &name);
+    }
 }
 
-fn draw_vertical(svg: &mut Svg, axis: &Axis, axes: &Axes, room: f64) {
-    let (marks, name) = ticks(axis, axes.low[1], axes.high[1], 9.0);
+fn draw_vertical(svg: &mut Svg, chart: &Chart, axes: &Axes) {
+    let (marks, name) = vertical_ticks(chart, axes);
     let [left, right] = [axes.corner[0], axes.corner[0] + axes.size[0]];
     for (value, label) in &marks {
         let y = axes.place([axes.low[0], *value])[1];
@@ -264,7 +290,7 @@ fn draw_vertical(svg: &mut Svg, axis: &Axis, axes: &Axes, room: f64) {
         }
         svg.group(format_args!("stroke=\"{INK}\""), |svg| svg.line([left - long, y], [left, y]));
     }
-    svg.upward_text([left - room + 14.0, axes.corner[1] + axes.size[1] / 2.0], TEXT + 1.0, &name);
+    svg.upward_text([14.0, axes.corner[1] + axes.size[1] / 2.0], TEXT + 1.0, &name);
 }
 
 fn draw_landmark(svg: &mut Svg, chart: &Chart, axes: &Axes, landmark: &Landmark) {
@@ -285,7 +311,7 @@ fn draw_series(svg: &mut Svg, chart: &Chart, axes: &Axes, series: &Series) {
         series.points.iter().filter_map(|&p| on_axes(chart, p)).map(|p| axes.place(p)).collect();
     if matches!(series.style, Style::Line | Style::Front) {
         let mut path = Path::default();
-        path.polyline(page::thinned(&places));
+        path.polyline(thinned(&places));
         let width = if series.style == Style::Line { 1.7 } else { 1.0 };
         let stroke =
             format!("stroke=\"{}\" stroke-width=\"{width}\" stroke-linejoin=\"round\"", series.colour);

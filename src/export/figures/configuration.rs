@@ -14,6 +14,7 @@ use super::{MOST_DOTS, Subject};
 use crate::continuum::record::Snapshot;
 use crate::export::bonds;
 use crate::flock::role::Role;
+use crate::flock::rules::Axis;
 use crate::flock::vectors::distance;
 
 /// Bodies of more particles, or bonds, are drawn without bonds, which would be a grey sheet.
@@ -133,6 +134,10 @@ impl Setting {
             Style::Surface | Style::Raster if is_field => Vec::new(),
             _ => self.legend(style == Style::Raster, is_field),
         };
+        let is_railed = style == Style::Dots && rails(subject).next().is_some();
+        let (name, colour) = ("held along one axis".into(), colour::of_role(Role::Clamped));
+        let rail = is_railed.then_some(Key { name, colour, mark: Mark::Line });
+        let legend = legend.into_iter().chain(rail).collect();
         Heading { title: subject.title.into(), note, legend, least: self.heading }
     }
 
@@ -180,6 +185,7 @@ pub fn configuration_in(
             _ => {
                 draw_bonds(svg, axes, subject, snapshot);
                 draw_dots(svg, axes, snapshot, spacing, field);
+                draw_rails(svg, axes, subject, snapshot);
             }
         }
         if let Some(field) = field {
@@ -268,6 +274,37 @@ fn draw_dots(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, spacing: f64, fiel
             svg.group(attributes, |svg| dots(svg, mark_of(role), &|i| is_it(i) && field.band(i) == band));
         }
     }
+}
+
+/// Particles of which one component is held or led from the start, with the axis along which they may move.
+fn rails<'a>(subject: &Subject<'a>) -> impl Iterator<Item = (usize, Axis)> + 'a {
+    let changes = subject.changes.iter().filter(|change| change.is_at_once());
+    changes.filter_map(|change| Some((change, change.axis?))).flat_map(|(change, held)| {
+        let free = if held == Axis::X { Axis::Y } else { Axis::X };
+        change.particles.iter().map(move |&i| (i, free))
+    })
+}
+
+/// A short line along which each of them may move.
+fn draw_rails(svg: &mut Svg, axes: &Axes, subject: &Subject<'_>, snapshot: &Snapshot) {
+    if rails(subject).next().is_none() {
+        return;
+    }
+    let radius = dot_radius(axes, subject.body.lattice.spacing());
+    let attributes = format!(
+        "class=\"rail\" stroke=\"{}\" stroke-width=\"{:.2}\"",
+        colour::of_role(Role::Clamped),
+        0.5 * radius
+    );
+    svg.group(attributes, |svg| {
+        for (i, free) in rails(subject) {
+            let [x, y] = axes.place(snapshot.positions.get(i));
+            let [dx, dy] = if free == Axis::X { [1.8 * radius, 0.0] } else { [0.0, 1.8 * radius] };
+            if [x, y].iter().all(|value| value.is_finite()) {
+                svg.line([x - dx, y - dy], [x + dx, y + dy]);
+            }
+        }
+    });
 }
 
 fn draw_field_raster(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, field: &Field<'_>, spacing: f64) {

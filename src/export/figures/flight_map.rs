@@ -4,7 +4,7 @@ use super::axes::Axes;
 use super::bands::Field;
 use super::colour;
 use super::configuration::mark_of;
-use super::heading::{Heading, Key, Mark, draw_mark};
+use super::heading::{DIAMOND, Heading, Key, Mark, draw_mark};
 use super::page;
 use super::svg::{Path, Svg};
 use crate::flock::role::Role;
@@ -154,9 +154,18 @@ impl<'a> Map<'a> {
     fn draw_robots(&self, svg: &mut Svg, axes: &Axes, moment: &Moment<'_>) {
         for (led, role) in [(false, Role::Follower), (true, Role::Leader)] {
             let (own, mark) = (colour::of_role(role), mark_of(role));
+            if led {
+                // A diamond has its corners on the rim, which would leave a leader smaller than a follower.
+                svg.group(format_args!("class=\"hull\" fill=\"{LED_WAY}\""), |svg| {
+                    for m in (0..moment.places.len()).filter(|&m| self.leads(m)) {
+                        svg.circle(axes.place(moment.places.get(m)), self.radius(axes, m));
+                    }
+                });
+            }
             svg.group(format_args!("class=\"{}\" fill=\"{own}\"", role.name()), |svg| {
                 for m in (0..moment.places.len()).filter(|&m| self.leads(m) == led) {
-                    let (at, radius) = (axes.place(moment.places.get(m)), self.radius(axes, m));
+                    let at = axes.place(moment.places.get(m));
+                    let radius = self.radius(axes, m) / if led { DIAMOND } else { 1.0 };
                     match &moment.field {
                         None => draw_mark(svg, mark, at, radius),
                         Some(field) => {

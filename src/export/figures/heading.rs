@@ -92,6 +92,9 @@ fn draw_key(svg: &mut Svg, key: &Key, [x, y]: [f64; 2]) {
     svg.text([x + 21.0, y], Anchor::Start, KEY_TEXT, INK, &key.name);
 }
 
+/// From a diamond's middle to its corners, in radii of a dot about as large.
+pub const DIAMOND: f64 = 1.25;
+
 /// Draws a mark about as large as a dot of this radius; anything but a square and a diamond as that dot \[px\].
 pub fn draw_mark(svg: &mut Svg, mark: Mark, [x, y]: [f64; 2], radius: f64) {
     let mut polygon = |corners: [[f64; 2]; 4], half: f64| {
@@ -101,7 +104,7 @@ pub fn draw_mark(svg: &mut Svg, mark: Mark, [x, y]: [f64; 2], radius: f64) {
     };
     match mark {
         Mark::Square => polygon([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]], 0.9 * radius),
-        Mark::Diamond => polygon([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]], 1.25 * radius),
+        Mark::Diamond => polygon([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]], DIAMOND * radius),
         _ => svg.circle([x, y], radius),
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! [`configuration()`]: the body at a step, in the paper's colours. [`pe1`]: filled contours of the first
 //! pseudo-energy over it. [`stress()`] and [`components()`]: the von Mises stress of its cells, and
-//! the components of their stress. [`probes`]: the history of a few particles. [`overlay`] and [`von_mises()`]: what a
+//! the components of their stress. [`probes()`]: the history of a few particles. [`overlay`] and [`von_mises()`]: what a
 //! rule makes of a body beside the truth. Axes of bodies are equal, and every axis carries its unit. SVG is
 //! written directly: a figure here is circles, lines and paths, and what matters is where they go.
 
@@ -18,10 +18,10 @@ mod faces;
 #[cfg(feature = "swarm")]
 pub(crate) mod flight_map;
 pub(super) mod heading;
-mod history;
 pub(super) mod page;
 pub(super) mod panels;
 pub(super) mod png;
+pub(super) mod probes;
 mod raster;
 mod stress;
 mod svg;
@@ -35,6 +35,7 @@ use std::path::PathBuf;
 use super::OutputFolder;
 use super::error::{ExportError, write_file};
 use crate::engine::Engine;
+use crate::engine::setup::RoleChange;
 use crate::flock::body::Body;
 use crate::flock::neighbourhood::Neighbours;
 use crate::material::cells::Cells;
@@ -44,7 +45,7 @@ pub use comparison::{Pair, overlay};
 pub use components::components;
 pub use configuration::configuration;
 pub use energy::pe1;
-pub use history::probes;
+pub use probes::probes;
 pub use stress::stress;
 pub use svg::INK;
 pub use von_mises::von_mises;
@@ -62,6 +63,8 @@ pub struct Subject<'a> {
     pub neighbours: Option<&'a Neighbours>,
     /// Between the particles, where the scene has a material.
     pub cells: Option<&'a Cells>,
+    /// Roles that particles take, single components among them.
+    pub changes: &'a [RoleChange],
     /// The unit of the run's clock: `step` or `increment`.
     pub counts: &'static str,
     /// Whether the body was solved for its equilibrium: no steps lead there.
@@ -77,6 +80,7 @@ impl<'a> Subject<'a> {
             body: engine.body(),
             neighbours: engine.lasting_neighbours(),
             cells: engine.cells(),
+            changes: engine.changes(),
             counts: scene.counts(),
             is_solved_at_once: scene.is_solved_at_once(),
         }

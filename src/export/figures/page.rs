@@ -94,35 +94,3 @@ pub fn note_at(clock: &str, broken: usize) -> String {
     };
     format!("{clock}{broken}")
 }
-
-/// The part of a long line that a sheet can show: the ends and extremes within each half pixel.
-pub fn thinned(line: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    if line.len() < 4 * WIDTH as usize {
-        return line.to_vec();
-    }
-    let mut kept = Vec::new();
-    for run in line.chunk_by(|a, b| (2.0 * a[0]).floor() == (2.0 * b[0]).floor()) {
-        let by_height = |a: &&[f64; 2], b: &&[f64; 2]| a[1].total_cmp(&b[1]);
-        let extremes = [run.iter().min_by(by_height), run.iter().max_by(by_height)];
-        let mut of_run: Vec<[f64; 2]> =
-            [run.first(), run.last()].into_iter().chain(extremes).flatten().copied().collect();
-        of_run.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        of_run.dedup();
-        kept.extend(of_run);
-    }
-    kept
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_thinned_line_keeps_its_peaks() {
-        let mut line: Vec<[f64; 2]> = (0..100_000).map(|n| [f64::from(n) * 0.007, 0.0]).collect();
-        line[54_321][1] = -3.0;
-        let kept = thinned(&line);
-        assert!(kept.len() < 6000, "{}", kept.len());
-        assert!(kept.iter().any(|point| point[1] == -3.0));
-    }
-}

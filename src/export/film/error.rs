@@ -20,12 +20,6 @@ pub enum FilmError {
     /// A folder that does not exist.
     #[error("there is no folder {} for the film\n  help: make it, or give --film another place", .0.display())]
     NoFolder(PathBuf),
-    /// A place inside the folder of results, which appears only at the end.
-    #[error(
-        "the film would stand in {}, which is for the results alone\n  help: give --film a place outside it",
-        .0.display()
-    )]
-    InResults(PathBuf),
     /// Another program makes the same film.
     #[error("{} is being made by another flockform that still runs: give --film another name", .0.display())]
     Busy(PathBuf),
@@ -41,14 +35,12 @@ pub enum FilmError {
         reason: String,
     },
     /// A quantity that the subject does not have.
-    #[error("--film-colour {colour}: {reason}\n  help: {} can be shown: {choices}", .of)]
+    #[error("--film-colour {colour}: {reason}\n  help: choose {choices}")]
     Colour {
         /// The quantity asked for.
         colour: &'static str,
         /// Reason for the refusal.
         reason: &'static str,
-        /// Of what others can be shown.
-        of: &'static str,
         /// The others.
         choices: &'static str,
     },

@@ -59,19 +59,14 @@ pub struct FilmFile {
 }
 
 impl FilmFile {
-    /// A file that can be written, beside its place, as `.NAME.partial`; `results` is the folder of the results, as
-    /// far as one was asked for.
+    /// A file that can be written, beside its place, as `.NAME.partial`.
     ///
     /// # Errors
-    /// An ending that names no film; a place inside the results; a file in the place, without `force` or not a film; no folder, or none that can
-    /// be written to; a video without `ffmpeg`; another program that makes the same film.
-    pub fn create(path: &Path, results: Option<&Path>, force: bool) -> Result<Self, FilmError> {
+    /// An ending that names no film; a file in the place, without `force` or not a film; no folder, or none that can be
+    /// written to; a video without `ffmpeg`; another program that makes the same film.
+    pub fn create(path: &Path, force: bool) -> Result<Self, FilmError> {
         let format = FilmFormat::of(path)?;
-        let in_full = |path: &Path| std::path::absolute(path).map_err(FilmError::io("find", path));
-        let path = in_full(path)?;
-        if let Some(results) = results.map(in_full).transpose()?.filter(|results| path.starts_with(results)) {
-            return Err(FilmError::InResults(results));
-        }
+        let path = std::path::absolute(path).map_err(FilmError::io("find", path))?;
         require_free(&path, format, force)?;
         if let Some(folder) = path.parent().filter(|folder| !folder.is_dir()) {
             return Err(FilmError::NoFolder(folder.to_owned()));

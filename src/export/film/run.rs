@@ -35,8 +35,8 @@ pub fn require_colour(scene: &Scene, colour: FilmColour) -> Result<(), FilmError
         _ => return Ok(()),
     };
     let colour = colour.name();
-    let choices = "role, displacement, pe1, strain; pe2 of what is stepped, von-mises of a material";
-    Err(FilmError::Colour { colour, reason, of: "of a body", choices })
+    let choices = "role, displacement, pe1 or strain; pe2 needs a stepped run, von-mises a material";
+    Err(FilmError::Colour { colour, reason, choices })
 }
 
 /// The film of a run whose recorder is finished.

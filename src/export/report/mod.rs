@@ -17,7 +17,6 @@ pub mod flight;
 pub(crate) mod frames;
 pub mod gallery;
 pub mod page;
-mod probes;
 pub(crate) mod quantized_channel;
 pub mod run;
 pub mod stability;

@@ -8,14 +8,13 @@ use serde::{Deserialize, Serialize};
 
 use super::super::bonds::pairs;
 use super::super::error::ExportError;
-use super::super::figures::chart;
+use super::super::figures::{chart, probes};
 use super::super::load;
 use super::super::{OutputFolder, Results, Signed, Summary};
 use super::encode::GROUP;
 use super::encoded;
 use super::frames::{Channel, Frame, Frames, MOST_FRAMES};
 use super::page::{Page, number, scene_text};
-use super::probes;
 use super::view::{Animation, Clock, Quantity, Stress, View};
 use crate::continuum::mechanics::Stresses;
 use crate::continuum::memory::{measured, neighbour_entries};

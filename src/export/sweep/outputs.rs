@@ -24,6 +24,18 @@ pub enum OutputError {
         /// The id in it.
         id: usize,
     },
+    /// A step that no run comes to.
+    #[error("--outputs {name}: the last {unit} is {last}\n  help: give one up to it, or raise {bound}")]
+    Late {
+        /// The text given.
+        name: String,
+        /// What runs count.
+        unit: &'static str,
+        /// The last of a run.
+        last: usize,
+        /// The key that sets it.
+        bound: &'static str,
+    },
     /// The summary has no such key.
     #[error("--outputs {name}: summary.json has no such key\n  help: {} has {}", place(.at), .there.join(", "))]
     Unknown {
@@ -123,6 +135,23 @@ impl Output {
         let material = of_material.into_iter().filter(|_| scene.material.is_some());
         let fracture = of_fracture.into_iter().filter(|_| scene.fracture.is_some());
         always.into_iter().chain(material).chain(fracture).map(str::to_owned).collect()
+    }
+}
+
+impl Output {
+    /// Refuses a step that a run of this scene cannot come to.
+    ///
+    /// # Errors
+    /// Names the last step.
+    pub fn require_within(&self, scene: &Scene) -> Result<(), OutputError> {
+        let (last, unit) = (scene.most_steps(), scene.counts());
+        match self {
+            Output::Probe { name, step: Some(step), .. } if *step > last => {
+                let bound = if unit == "step" { "stop.steps" } else { "load_steps" };
+                Err(OutputError::Late { name: name.clone(), unit, last, bound })
+            }
+            _ => Ok(()),
+        }
     }
 }
 

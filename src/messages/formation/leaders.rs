@@ -1,6 +1,8 @@
 //! How the service `~/set_formation` moves the leaders.
 
-use crate::flock::manoeuvre::{Leg, Manoeuvre, Posture};
+use std::f64::consts::TAU;
+
+use crate::flock::manoeuvre::{Affine, Demand, Leg, Manoeuvre, Posture};
 use crate::flock::vectors::distance;
 use crate::messages::flockform_msgs::{LoopEvent, SetFormationRequest};
 use crate::messages::said;
@@ -56,20 +58,34 @@ pub fn set_formation(control: &mut Control, request: &SetFormationRequest) -> Re
     Ok(format!("under way for {duration} s"))
 }
 
-/// Moments of a manoeuvre that are looked at.
-const LOOKS: usize = 64;
+/// Moments of a manoeuvre whose places are looked at.
+const LOOKS: u32 = 64;
+
+/// Angle between two looks at a turn \[rad\].
+const PART: f64 = 0.1;
+
+/// Where the formation comes in a manoeuvre of one leg. Between two moments it may turn far, past what it passes at
+/// neither; of several rounds one is looked at.
+fn passed(manoeuvre: &Manoeuvre) -> Vec<Affine> {
+    let posture = |k: u32| manoeuvre.posture(manoeuvre.duration() * f64::from(k) / f64::from(LOOKS));
+    let between = |k: u32| {
+        let (here, next) = (posture(k), posture((k + 1).min(LOOKS)));
+        let turn = (next.rotate - here.rotate).clamp(-TAU, TAU);
+        let looks = (turn.abs() / PART).ceil().max(1.0);
+        (0..looks as u32)
+            .map(move |n| Posture { rotate: here.rotate % TAU + turn * f64::from(n) / looks, ..here })
+            .map(|posture| posture.affine(manoeuvre.about))
+    };
+    (0..=LOOKS).flat_map(between).collect()
+}
 
 /// Refuses a manoeuvre that no robot within the limits can follow, or that leads out of the range of accepted poses:
 /// the filter would hold the robots back while the leaders' program goes on without them.
 fn check_flyable(control: &Control, manoeuvre: &Manoeuvre) -> Result<(), String> {
     let (limits, formation, watch) = (control.limits(), control.formation(), control.watch().limits());
-    let duration = manoeuvre.duration();
-    let step = duration / LOOKS as f64;
-    let maps: Vec<_> = (0..=LOOKS).map(|k| manoeuvre.affine(k as f64 * step)).collect();
-    let (mut speed, mut acceleration) = (0.0_f64, 0.0_f64);
+    let maps = passed(manoeuvre);
     for (place, &radius) in formation.places.iter().zip(&formation.radii) {
-        let way: Vec<[f64; 2]> = maps.iter().map(|map| map.apply(place)).collect();
-        for &there in &way {
+        for there in maps.iter().map(|map| map.apply(place)) {
             let away = distance(there, watch.centre);
             if away.is_nan() || away > watch.range {
                 return Err(format!(
@@ -84,22 +100,56 @@ fn check_flyable(control: &Control, manoeuvre: &Manoeuvre) -> Result<(), String>
                 ));
             }
         }
-        speed = way.windows(2).map(|two| distance(two[0], two[1]) / step).fold(speed, f64::max);
-        let bend = |w: &[[f64; 2]]| {
-            f64::hypot(w[2][0] - 2.0 * w[1][0] + w[0][0], w[2][1] - 2.0 * w[1][1] + w[0][1]) / (step * step)
-        };
-        acceleration = way.windows(3).map(bend).fold(acceleration, f64::max);
     }
+    let Demand { speed, acceleration } = manoeuvre.demand(&formation.places);
     let slower = f64::max(speed / limits.speed, (acceleration / limits.acceleration).sqrt());
-    // To the rounding of the looks.
+    // To rounding.
     if slower > 1.0 + 1e-6 {
         return Err(format!(
             "it asks for {speed:.3} m/s and {acceleration:.3} m/s^2, the limits are {} and {}: give a duration of \
              at least {:.2} s",
             limits.speed,
             limits.acceleration,
-            duration * slower + 0.005
+            manoeuvre.duration() * slower + 0.005
         ));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::bundled::bundled_swarm;
+
+    #[test]
+    fn a_turn_of_many_rounds_is_refused_for_what_it_is_between_the_looks() {
+        let swarm = |set: &[&str]| {
+            let set: Vec<String> = set.iter().map(|&one| one.to_owned()).collect();
+            bundled_swarm("square").expect("bundled").load_swarm(&set).expect("loads")
+        };
+        let ask = |set: &[&str], rotate: f64, duration: f64| {
+            let mut control = Control::new(&swarm(set)).expect("laid out");
+            let request =
+                SetFormationRequest { stretch: [1.0; 2], rotate, duration, ..SetFormationRequest::default() };
+            set_formation(&mut control, &request)
+        };
+        let control = Control::new(&swarm(&[])).expect("laid out");
+        let formation = control.formation();
+        let reach =
+            formation.places.iter().map(|place| distance(place, formation.middle())).fold(0.0, f64::max);
+        let limit = control.limits().speed;
+        // Whole rounds between two of the looks at its way, so that these see nothing move.
+        for rounds in [1.0, 64.0, 1000.0, 64_000.0] {
+            let least = 1.5 * rounds * TAU * reach / limit;
+            let refused = ask(&[], rounds * TAU, 0.9 * least).expect_err("too fast");
+            assert!(refused.contains(&format!("it asks for {:.3} m/s", limit / 0.9)), "{refused}");
+            assert!(ask(&[], rounds * TAU, 1.01 * least).is_ok(), "{rounds} rounds");
+            let [x, y] = formation.middle();
+            let edge = |a: f64| format!("[{}, {}]", x + 1.2 * reach * a.cos(), y + 0.95 * reach * a.sin());
+            let corners: Vec<String> = (0..64).map(|k| edge(TAU * f64::from(k) / 64.0)).collect();
+            let fence = format!("limits.geofence=[{}]", corners.join(", "));
+            let refused = ask(&[&fence], rounds * TAU, 1.01 * least).expect_err("leads out");
+            assert!(refused.contains("not inside the geofence"), "{refused}");
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! Which arguments are ROS ones, and what each flag takes.
 
+use std::ffi::OsStr;
 use std::path::PathBuf;
 
 use super::assignment::{Assignment, Origin};
@@ -31,16 +32,16 @@ pub const FLAGS: [&str; 17] = [
 ];
 
 /// Splits arguments at `--ros-args ... [--]` (any number of times) and reads the ROS ones.
-pub fn parse(
-    arguments: impl IntoIterator<Item = String>,
-) -> Result<(Vec<String>, RosArguments), RosArgumentError> {
+pub fn parse<A: AsRef<OsStr>>(
+    arguments: impl IntoIterator<Item = A>,
+) -> Result<(Vec<A>, RosArguments), RosArgumentError> {
     let mut arguments = arguments.into_iter();
     let (mut rest, mut ros, mut inside) = (Vec::new(), RosArguments::default(), false);
     while let Some(argument) = arguments.next() {
-        match (inside, argument.as_str()) {
-            (_, "--ros-args") => inside = true,
-            (true, "--") => inside = false,
-            (true, _) => ros.take_flag(argument, &mut arguments)?,
+        match (inside, argument.as_ref().to_str()) {
+            (_, Some("--ros-args")) => inside = true,
+            (true, Some("--")) => inside = false,
+            (true, _) => ros.take_flag(&argument.as_ref().to_string_lossy(), &mut arguments)?,
             (false, _) => rest.push(argument),
         }
     }
@@ -50,31 +51,33 @@ pub fn parse(
 impl RosArguments {
     fn take_flag(
         &mut self,
-        flag: String,
-        arguments: &mut impl Iterator<Item = String>,
+        flag: &str,
+        arguments: &mut impl Iterator<Item: AsRef<OsStr>>,
     ) -> Result<(), RosArgumentError> {
         // As in rcl, a flag takes whatever follows, even `--`.
         let mut value = |expects: &'static str| {
-            arguments.next().ok_or_else(|| RosArgumentError::MissingValue { flag: flag.clone(), expects })
+            let missing = || RosArgumentError::MissingValue { flag: flag.into(), expects };
+            arguments.next().ok_or_else(missing)
         };
-        match flag.as_str() {
-            "-r" | "--remap" => self.remaps.push(RemapRule::parse(&flag, &value("a rule FROM:=TO")?)?),
+        let mut text = |expects: &'static str| read_text(flag, value(expects)?.as_ref());
+        match flag {
+            "-r" | "--remap" => self.remaps.push(RemapRule::parse(flag, &text("a rule FROM:=TO")?)?),
             "-p" | "--param" => {
-                self.assignments.push(assignment::parse(&flag, &value("an assignment NAME:=VALUE")?)?);
+                self.assignments.push(assignment::parse(flag, &text("an assignment NAME:=VALUE")?)?);
             }
-            "--params-file" => self.read_parameters(value("the path of a YAML file")?.into())?,
+            "--params-file" => self.read_parameters(value("the path of a YAML file")?.as_ref().into())?,
             "--log-level" => {
-                let rule = value("a level or LOGGER:=LEVEL")?;
+                let rule = text("a level or LOGGER:=LEVEL")?;
                 self.logging.take_level(&rule)?;
             }
             "--log-config-file" => {
-                return Err(no_log_library(&flag, value("the path of a configuration file")?));
+                return Err(no_log_library(flag, text("the path of a configuration file")?));
             }
-            "--log-file-name" => return Err(no_log_library(&flag, value("a file name prefix")?)),
-            "-e" | "--enclave" => self.enclave = Some(enclave(&flag, value("a security enclave /PATH")?)?),
+            "--log-file-name" => return Err(no_log_library(flag, text("a file name prefix")?)),
+            "-e" | "--enclave" => self.enclave = Some(enclave(flag, text("a security enclave /PATH")?)?),
             switch if switch_of(&mut self.logging, switch) => {}
-            "--enable-external-lib-logs" => return Err(no_log_library(&flag, String::new())),
-            _ => return Err(unknown(flag)),
+            "--enable-external-lib-logs" => return Err(no_log_library(flag, String::new())),
+            _ => return Err(unknown(flag.into())),
         }
         Ok(())
     }
@@ -90,6 +93,17 @@ impl RosArguments {
         self.parameter_files.push(path);
         Ok(())
     }
+}
+
+/// A rule, which is text; a path alone may be any bytes.
+fn read_text(flag: &str, value: &OsStr) -> Result<String, RosArgumentError> {
+    let refuse = || RosArgumentError::Rule {
+        flag: flag.into(),
+        rule: value.to_string_lossy().into_owned(),
+        reason: "it is not UTF-8".into(),
+        help: "write it in UTF-8",
+    };
+    value.to_str().map(str::to_owned).ok_or_else(refuse)
 }
 
 fn enclave(flag: &str, name: String) -> Result<String, RosArgumentError> {

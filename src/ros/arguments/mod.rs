@@ -32,6 +32,7 @@ mod security;
 pub mod value;
 mod yaml;
 
+use std::ffi::OsStr;
 use std::path::PathBuf;
 
 pub use crate::messages::names::{NameError, Names};
@@ -71,10 +72,10 @@ impl RosArguments {
     /// An unknown flag, a flag without its value, a rule that does not parse, a parameter file that
     /// cannot be read or understood, an environment variable out of its range, security that is enforced and
     /// cannot be had.
-    pub fn parse(
-        arguments: impl IntoIterator<Item = String>,
+    pub fn parse<A: AsRef<OsStr>>(
+        arguments: impl IntoIterator<Item = A>,
         environment: &dyn Fn(&str) -> Option<String>,
-    ) -> Result<(Vec<String>, Self), RosArgumentError> {
+    ) -> Result<(Vec<A>, Self), RosArgumentError> {
         let environment = Environment::read(environment)?;
         let (rest, parsed) = grammar::parse(arguments)?;
         let security = environment.security.settle(parsed.enclave.as_deref())?;

@@ -15,7 +15,7 @@ pub struct Clock {
 const PATIENCE: Duration = Duration::from_secs(3);
 
 struct Simulated {
-    /// Time of the computer at which the subscription was made.
+    /// Time of the computer at which the simulator last spoke, or the subscription was made.
     since: Instant,
     subscription: Subscription<rosgraph_msgs::Clock>,
     reading: Reading,
@@ -67,14 +67,22 @@ impl Clock {
         Ok(Self { simulated: Some(Simulated { since: Instant::now(), subscription, reading }) })
     }
 
-    /// Hears what came since the last tick. Returns how far time went back \[s\], if it did: everything
-    /// stamped before then is from another run.
-    pub fn poll(&mut self) -> Option<f64> {
-        let Simulated { subscription, reading, .. } = self.simulated.as_mut()?;
-        while let Some((message, _)) = subscription.take() {
-            reading.receive(message.clock.seconds());
+    /// Hears what came since it was last read, and returns the time, as [`Clock::now`].
+    pub fn read(&mut self) -> Option<f64> {
+        if let Some(Simulated { since, subscription, reading }) = &mut self.simulated {
+            while let Some((message, _)) = subscription.take() {
+                *since = Instant::now();
+                reading.receive(message.clock.seconds());
+            }
         }
-        reading.jump_back()
+        self.now()
+    }
+
+    /// Hears what came. Returns how far time went back \[s\] since it was last asked, if it did: everything stamped
+    /// before then is from another run.
+    pub fn poll(&mut self) -> Option<f64> {
+        self.read();
+        self.simulated.as_mut()?.reading.jump_back()
     }
 
     /// Seconds since the epoch; `None` while the simulator has not spoken.
@@ -85,11 +93,10 @@ impl Clock {
         }
     }
 
-    /// The simulator's topic, if nothing has come on it for some seconds since the beginning.
+    /// The simulator's topic, if nothing has come on it for some seconds.
     pub fn silent(&self) -> Option<&str> {
-        let Simulated { since, subscription, reading } = self.simulated.as_ref()?;
-        let silent = reading.now().is_none() && since.elapsed() > PATIENCE;
-        silent.then(|| subscription.topic())
+        let Simulated { since, subscription, .. } = self.simulated.as_ref()?;
+        (since.elapsed() > PATIENCE).then(|| subscription.topic())
     }
 
     /// Whether time comes from `/clock`.

@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use ros2_client::dds::rustdds::no_key::DataWriterCdr;
 use ros2_client::dds::rustdds::{
-    DomainParticipant, DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, StatusEvented,
-    Timestamp,
+    DomainParticipant, DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, LostReason,
+    StatusEvented, Timestamp,
 };
 use ros2_client::entities_info::{NodeEntitiesInfo, ParticipantEntitiesInfo};
 use ros2_client::{Gid, NodeName};
@@ -51,6 +51,10 @@ pub(super) struct Graph {
 struct State {
     /// Local endpoint to the remote endpoints that match it.
     matched: BTreeMap<GUID, BTreeSet<GUID>>,
+    /// Local endpoint to the participants that have matched it and are not lost without a word.
+    met: BTreeMap<GUID, BTreeSet<[u8; 12]>>,
+    /// Participants that were met, have taken leave and have not announced themselves since.
+    left: BTreeSet<[u8; 12]>,
     /// Local endpoint to its ROS 2 name, for messages to people.
     names: BTreeMap<GUID, String>,
     /// Node's fully qualified name to what it owns.
@@ -99,6 +103,7 @@ impl Graph {
         let mut state = self.state();
         state.names.remove(&endpoint);
         state.matched.remove(&endpoint);
+        state.met.remove(&endpoint);
         for owned in state.nodes.values_mut() {
             owned.readers.retain(|reader| *reader != endpoint);
             owned.writers.retain(|writer| *writer != endpoint);
@@ -135,6 +140,13 @@ impl Graph {
             .is_some_and(|all| all.iter().any(|&guid| prefix(guid) == participant))
     }
 
+    /// Whether all whom a local endpoint has met have taken leave; `None` of one that has met nobody.
+    pub fn is_left(&self, local: GUID) -> Option<bool> {
+        let state = self.state();
+        let met = state.met.get(&local).filter(|met| !met.is_empty())?;
+        Some(met.is_subset(&state.left))
+    }
+
     /// Nodes of others that bear this name \[1\].
     pub fn twins(&self, node: &str) -> usize {
         self.state().twins.values().flatten().filter(|name| *name == node).count()
@@ -169,14 +181,32 @@ impl Graph {
             Event::RemoteReaderMatched { local_writer: local, remote_reader: remote }
             | Event::RemoteWriterMatched { local_reader: local, remote_writer: remote } => {
                 state.matched.entry(local).or_default().insert(remote);
+                let State { met, left, .. } = &mut *state;
+                let met = met.entry(local).or_default();
+                // Of those that are gone none is asked for any more.
+                met.retain(|one| !left.contains(one));
+                met.insert(prefix(remote));
+            }
+            Event::ParticipantDiscovered { dpd } => {
+                // A leave in its name was not its own.
+                state.left.remove(&prefix(dpd.guid));
             }
             Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
                 state.matched.values_mut().for_each(|all| {
                     all.remove(&guid);
                 });
             }
-            Event::ParticipantLost { id, .. } => {
+            Event::ParticipantLost { id, reason } => {
                 let gone: &[u8] = id.as_ref();
+                match reason {
+                    LostReason::Disposed => {
+                        let of_ours = state.met.values().flatten().find(|one| &one[..] == gone).copied();
+                        state.left.extend(of_ours);
+                    }
+                    LostReason::Timeout { .. } => {
+                        state.met.values_mut().for_each(|met| met.retain(|one| &one[..] != gone));
+                    }
+                }
                 state.matched.values_mut().for_each(|all| all.retain(|&guid| prefix(guid) != gone));
                 state.twins.retain(|from, _| from != gone);
             }
@@ -197,8 +227,10 @@ impl Graph {
     /// endpoint was removed would stay for ever.
     fn sweep(&self) {
         let mut state = self.state();
-        let State { matched, names, nameless, .. } = &mut *state;
+        let State { matched, met, left, names, nameless, .. } = &mut *state;
         matched.retain(|endpoint, _| names.contains_key(endpoint) || !nameless.contains(endpoint));
+        met.retain(|endpoint, _| matched.contains_key(endpoint));
+        left.retain(|one| met.values().any(|met| met.contains(one)));
         *nameless = matched.keys().filter(|endpoint| !names.contains_key(endpoint)).copied().collect();
     }
 
@@ -334,5 +366,29 @@ mod tests {
         graph.add_reader("/node", named, "/pose");
         graph.sweep();
         assert_eq!([graph.matched(named), graph.matched(gone)], [1, 0]);
+    }
+
+    #[test]
+    fn who_takes_leave_is_not_silent_who_is_lost_is_and_so_is_one_in_whose_name_another_took_leave() {
+        use DomainParticipantStatusEvent as Event;
+        let graph = Graph::default();
+        let local_reader = GUID::from_bytes([1; 16]);
+        let [first, second] = [2, 3].map(|k| GUID::from_bytes([k; 16]));
+        let meet = |remote_writer| graph.note(Event::RemoteWriterMatched { local_reader, remote_writer });
+        let lose = |guid: GUID, reason| graph.note(Event::ParticipantLost { id: guid.prefix, reason });
+        let timeout = || LostReason::Timeout { lease: Duration::ZERO.into(), elapsed: Duration::ZERO.into() };
+        assert_eq!(graph.is_left(local_reader), None, "it has met nobody");
+        lose(first, LostReason::Disposed);
+        meet(first);
+        meet(second);
+        assert_eq!(graph.is_left(local_reader), Some(false));
+        lose(first, LostReason::Disposed);
+        assert_eq!(graph.is_left(local_reader), Some(false), "one of two");
+        lose(second, timeout());
+        assert_eq!(graph.is_left(local_reader), Some(true), "the other is lost, and who is there has left");
+        meet(second);
+        assert_eq!(graph.is_left(local_reader), Some(false));
+        lose(second, timeout());
+        assert_eq!(graph.is_left(local_reader), None, "no leave");
     }
 }

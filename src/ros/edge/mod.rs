@@ -78,6 +78,10 @@ pub enum EdgeError {
          permissions.xml, below publish where it is written and below subscribe where it is read, and sign that anew"
     )]
     Forbidden { topic: String, reason: String },
+    #[error(
+        "topic {topic} has two uses: {kind} of this node, and commands to it\n  help: give the commands a topic of their own"
+    )]
+    OwnCommands { topic: String, kind: &'static str },
     #[error("not sent on {topic}: {reason}")]
     Send { topic: String, reason: String },
 }

@@ -1,5 +1,6 @@
 //! The participant of a process, and the nodes in it.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::net::IpAddr;
 use std::sync::mpsc::channel;
@@ -164,7 +165,7 @@ impl Edge {
         let parsed = NodeName::new(namespace, name).map_err(reserved)?;
         let names = Names::new(name, namespace, &[])?;
         self.shared.graph.add_node(parsed);
-        Ok(Node { shared: self.shared.clone(), name: qualified, names })
+        Ok(Node { shared: self.shared.clone(), name: qualified, names, commands: Mutex::default() })
     }
 
     /// A node of these names, whose rules its topics and services follow.
@@ -323,6 +324,8 @@ pub struct Node {
     shared: Arc<Shared>,
     name: String,
     names: Names,
+    /// Topics on which the node itself publishes nothing.
+    commands: Mutex<BTreeSet<String>>,
 }
 
 impl Node {
@@ -376,12 +379,20 @@ impl Node {
         Edge { shared: self.shared.clone() }.node(namespace, name)
     }
 
+    /// Refuses every publisher of this node on a topic from now on: it would command itself.
+    pub(in crate::ros) fn keep_for_commands(&self, topic: &str) {
+        self.commands.lock().unwrap_or_else(PoisonError::into_inner).insert(topic.to_owned());
+    }
+
     /// A publisher on a fully qualified topic.
     ///
     /// # Errors
-    /// A bad name, or an endpoint that RustDDS refuses (the same topic with another type).
+    /// A bad name, a topic that is kept for commands, or an endpoint that RustDDS refuses (the same topic with another type).
     pub fn publisher<M: Message>(&self, topic: &str, quality: Quality) -> Result<Publisher<M>, EdgeError> {
         names::check("topic", topic)?;
+        if self.commands.lock().unwrap_or_else(PoisonError::into_inner).contains(topic) {
+            return Err(EdgeError::OwnCommands { topic: topic.to_owned(), kind: M::NAME });
+        }
         let kind = names::dds_message(M::PACKAGE, M::NAME);
         let writer = self.shared.writer(&names::dds_topic(topic), &kind, quality)?;
         self.shared.graph.add_writer(&self.name, writer.guid(), topic);

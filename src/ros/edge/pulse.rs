@@ -143,15 +143,20 @@ impl Pulse {
     }
 
     /// Records after each tick whether the loop hears any peer. Forged discovery can leave the middleware deaf to all
-    /// its peers though otherwise sound; a new one finds them. A process that has never heard a peer waits for one.
-    pub(crate) fn note_peers(&self, any_peer: bool) {
+    /// its peers though otherwise sound; a new one finds them. A process that has never heard a peer, or whose peers have
+    /// all taken leave, waits for one; `left` says so of each source of theirs, and nothing of one that never had any.
+    pub(crate) fn note_peers(&self, any_peer: bool, left: impl FnOnce() -> Vec<Option<bool>>) {
         let mut heard = self.heard.lock().unwrap_or_else(PoisonError::into_inner);
         if any_peer {
             *heard = Some((Instant::now(), self.waited()));
-        } else if heard.is_some_and(|heard| self.is_lonely(heard))
-            && !self.given_up.swap(true, Ordering::Relaxed)
-        {
-            tracing::error!("the middleware is given up: all peers that were heard before are silent");
+        } else if heard.is_some_and(|heard| self.is_lonely(heard)) {
+            let left: Vec<bool> = left().into_iter().flatten().collect();
+            if !left.is_empty() && left.iter().all(|left| *left) {
+                *heard = None;
+                tracing::info!("all peers have left: waiting for others");
+            } else if !self.given_up.swap(true, Ordering::Relaxed) {
+                tracing::error!("the middleware is given up: all peers that were heard before are silent");
+            }
         }
     }
 
@@ -373,15 +378,31 @@ mod tests {
         let (moment, hour) = (Duration::from_millis(1), Duration::from_secs(3600));
         let is_lonely = |starved, waited: Duration| {
             let pulse = Pulse::new(Patience { deaf: hour, lonely: moment, starved });
-            pulse.note_peers(true);
+            pulse.note_peers(true, Vec::new);
             pulse.waited.store(waited.as_millis() as u64, Ordering::Relaxed);
             std::thread::sleep(5 * moment);
-            pulse.note_peers(false);
+            pulse.note_peers(false, Vec::new);
             pulse.is_given_up()
         };
         assert!(!is_lonely(hour, hour));
         assert!(is_lonely(hour, Duration::ZERO) && is_lonely(moment, hour));
         assert!(is_lonely(IN_THE_CLEAR.starved, hour));
+    }
+
+    #[test]
+    fn peers_that_took_leave_are_not_silent() {
+        let patience = Patience { lonely: Duration::from_millis(1), ..IN_THE_CLEAR };
+        let is_given_up = |left: &[Option<bool>]| {
+            let pulse = Pulse::new(patience);
+            pulse.note_peers(true, Vec::new);
+            std::thread::sleep(5 * patience.lonely);
+            for _ in 0..2 {
+                pulse.note_peers(false, || left.to_vec());
+            }
+            pulse.is_given_up()
+        };
+        assert!(!is_given_up(&[Some(true), None]) && !is_given_up(&[Some(true); 3]));
+        assert!(is_given_up(&[Some(true), Some(false)]) && is_given_up(&[None]) && is_given_up(&[]));
     }
 
     #[test]

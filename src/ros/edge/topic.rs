@@ -206,6 +206,11 @@ impl<M: Message> Subscription<M> {
         self.shared.graph.matched(self.reader.borrow().guid())
     }
 
+    /// Whether all publishers that there were have taken leave; `None` where there was none.
+    pub(in crate::ros) fn is_left(&self) -> Option<bool> {
+        self.shared.graph.is_left(self.reader.borrow().guid())
+    }
+
     pub fn topic(&self) -> &str {
         &self.topic
     }

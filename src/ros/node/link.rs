@@ -111,6 +111,11 @@ impl Link {
 }
 
 impl Link {
+    /// Of each source of poses, whether those that sent them have taken leave.
+    pub fn left(&self) -> Vec<Option<bool>> {
+        self.poses.left()
+    }
+
     fn receive_ranges(&mut self, now: f64, take: &mut dyn FnMut(Received)) {
         for (observer, topic) in &self.ranges {
             let Some((message, stamps)) = topic.take_last() else { continue };

@@ -1,6 +1,6 @@
 //! `flockform node`: the control loop over ROS 2.
 //!
-//! One thread ticks at a steady rate: it takes what arrived, calls [`Control::tick`] and lays what it publishes into
+//! One thread ticks at a steady rate, that of a simulator's clock where it goes by one: it takes what arrived, calls [`Control::tick`] and lays what it publishes into
 //! bounded queues. Everything it holds is polled; a peer that is slow, gone or wrong cannot hold it up, and a
 //! middleware that does ends the process ([`pulse`](super::edge::pulse)).
 
@@ -88,7 +88,7 @@ pub struct FormationNode {
     diagnostics: Publisher<DiagnosticArray>,
     statistics: Statistics,
     complaints: Complaints,
-    /// Whether the absence of a clock was reported.
+    /// Whether the present silence of the clock was reported.
     has_missed_clock: bool,
     /// Whether the node was active at the last tick; a change is recorded.
     was_active: bool,
@@ -99,7 +99,7 @@ pub struct FormationNode {
 }
 
 impl FormationNode {
-    /// Takes part in the network: for all members, or for one that hears none but itself and its neighbours.
+    /// Takes part in the network: for all members, or for one, which hears those that [`NodeScope`] says.
     ///
     /// # Errors
     /// An obstacle in the swarm file, the ROS arguments or the network.
@@ -109,27 +109,30 @@ impl FormationNode {
         let names = names(arguments, member)?;
         let edge = network::join(arguments)?;
         let node = edge.named_node(&names)?;
+        let raw = &swarm.raw.node;
+        let stop_topic = raw.commands.may_stop().then(|| names.fleet_topic(&raw.emergency_stop_topic));
+        let stop_topic = stop_topic.transpose()?;
+        stop_topic.iter().for_each(|topic| node.keep_for_commands(topic));
 
         let is_configured = Arc::default();
         let (settings, store) = settings::declare(&control, arguments, &names, swarm, &part, &is_configured)?;
         check_commands(swarm, settings.autostart)?;
         let clock = if settings.use_sim_time { Clock::simulated(&node)? } else { Clock::system() };
         let service = |leaf: &str| names.service(&format!("~/{leaf}")).map_err(NodeError::from);
-        let raw = &swarm.raw.node;
         control.set_active(false);
         let mut this = Self {
-            pace: Pace::new(settings.rate),
+            pace: if clock.is_simulated() {
+                Pace::following(settings.rate)
+            } else {
+                Pace::new(settings.rate)
+            },
             parameters: Parameters::open(&node, store, raw.serves(RawService::Parameters))?,
             lifecycle: Lifecycle::open(
                 &node,
                 [RawService::Lifecycle, RawService::TransitionEvents].map(|kind| raw.serves(kind)),
             )?,
             stop: node.service(&service("emergency_stop")?)?,
-            stop_requests: raw
-                .commands
-                .may_stop()
-                .then(|| names.fleet_topic(&raw.emergency_stop_topic).map_err(NodeError::from))
-                .transpose()?
+            stop_requests: stop_topic
                 .map(|topic| node.subscription(&topic, Quality::reliable(1)))
                 .transpose()?,
             resume: node.service(&service("resume")?)?,
@@ -240,16 +243,20 @@ impl FormationNode {
         self.run_while(stop, &mut |_| true);
     }
 
-    /// Ticks until `stop` is set or `look`, which is shown the node after each tick, has seen enough; false if the
-    /// watchdog came first.
+    /// Ticks until `stop` is set or `look` has seen enough; false if the watchdog came first. `look` is shown the node
+    /// after each tick and, under a simulator's clock, at least once in a period of the computer's.
     pub fn run_while(&mut self, stop: &AtomicBool, look: &mut dyn FnMut(&Self) -> bool) -> bool {
         while !stop.load(Ordering::Relaxed) {
-            let missed = self.pace.wait();
-            self.statistics.missed += missed;
-            self.tick();
+            match self.wait() {
+                Some(missed) => {
+                    self.statistics.missed += missed;
+                    self.tick();
+                }
+                None => self.attend(),
+            }
             if let Some(pulse) = &self.pulse {
-                match self.endpoints {
-                    Some(_) => pulse.note_peers(self.hears_any()),
+                match &self.endpoints {
+                    Some(endpoints) => pulse.note_peers(self.hears_any(), || endpoints.link.left()),
                     None => pulse.listens_to_none(),
                 }
             }
@@ -303,19 +310,39 @@ impl FormationNode {
         }
     }
 
-    /// One period: what arrived, the targets, what is published.
-    pub fn tick(&mut self) {
-        let begun = Instant::now();
+    /// Sleeps until a tick is due, as [`Pace::follow`].
+    fn wait(&mut self) -> Option<u64> {
+        let Self { pace, clock, pulse, .. } = self;
+        pace.follow(&mut || {
+            let _inside = pulse.as_ref().map(|pulse| pulse.inside());
+            clock.read()
+        })
+    }
+
+    /// What is done whether or not a simulator's time goes on: commands, the log, a word about a clock that is silent.
+    fn attend(&mut self) {
         let pulse = self.pulse.clone();
-        let inside = pulse.as_ref().map(|pulse| pulse.inside());
+        let _inside = pulse.as_ref().map(|pulse| pulse.inside());
         if let Some(jump) = self.clock.poll() {
             tracing::warn!("time went back by {jump} s: waiting for poses of the new time");
         }
         let stamp = self.time();
         self.answer(stamp);
+        if !self.lifecycle.is_active() {
+            self.publish(stamp, false);
+        }
         self.rosout.iter().for_each(Rosout::publish);
+        self.watch_clock(stamp);
+    }
+
+    /// One period: what arrived, the targets, what is published.
+    pub fn tick(&mut self) {
+        let begun = Instant::now();
+        self.attend();
         // Without a clock poses have no age, and none can be accepted.
-        let Some(now) = self.clock.now() else { return self.wait_for_clock(stamp) };
+        let Some(now) = self.clock.now() else { return };
+        let pulse = self.pulse.clone();
+        let inside = pulse.as_ref().map(|pulse| pulse.inside());
         if let Some(endpoints) = &mut self.endpoints {
             listen(&mut self.control, &mut endpoints.link, &mut self.complaints, now);
             endpoints.warn_of_silence(&self.control, &self.origin);
@@ -328,14 +355,16 @@ impl FormationNode {
         self.report(now);
     }
 
-    /// A period without a clock; `stamp` \[s\] is the computer's time.
-    fn wait_for_clock(&mut self, stamp: f64) {
-        let Some(trouble) = self.no_clock() else { return };
-        if !std::mem::replace(&mut self.has_missed_clock, true) {
+    /// Says that the clock is silent: once in the log, and in diagnostics, which are due by the computer's time then.
+    fn watch_clock(&mut self, stamp: f64) {
+        let trouble = self.no_clock();
+        let was_missed = std::mem::replace(&mut self.has_missed_clock, trouble.is_some());
+        let Some(trouble) = trouble else { return };
+        if !was_missed {
             tracing::warn!("{trouble}");
         }
-        // Not recorded: the time of a recording is the loop's, which has not begun.
-        if self.statistics.is_due(diagnostics::DIAGNOSTICS, stamp, 1.0) {
+        // Not recorded: the time of a recording is the loop's, which stands.
+        if self.statistics.is_due(diagnostics::DIAGNOSTICS, system_time(), 1.0) {
             let message = self.diagnosis(stamp);
             self.statistics.sent(self.diagnostics.publish(&message));
         }
@@ -343,7 +372,10 @@ impl FormationNode {
 
     fn no_clock(&self) -> Option<String> {
         let topic = self.clock.silent()?;
-        Some(format!("use_sim_time is true and no time has come on {topic}: no robot moves until one does"))
+        let since = if self.clock.now().is_some() { " for three seconds" } else { "" };
+        Some(format!(
+            "use_sim_time is true and no time has come on {topic}{since}: no robot moves until one does"
+        ))
     }
 
     fn apply(&mut self, changes: &[Change], now: f64) {

@@ -79,6 +79,9 @@ impl Origin {
             ("velocities", &raw.velocity_topic, &part.mine, &has_velocity),
         ];
         let mut uses = Uses::default();
+        if raw.commands.may_stop() {
+            uses.add(self.names.fleet_topic(&raw.emergency_stop_topic)?, "emergency stops", "all robots")?;
+        }
         for (purpose, pattern, own, is_used) in patterns {
             // Topics below the node are its own alone: other robots' nodes have others.
             let is_private = pattern.starts_with('~');

@@ -72,6 +72,16 @@ impl PoseSource {
         }
     }
 
+    /// Of each topic, whether those that sent poses on it have taken leave.
+    pub fn left(&self) -> Vec<Option<bool>> {
+        match self {
+            Self::Stamped(all) => all.iter().map(|(_, topic)| topic.is_left()).collect(),
+            Self::WithCovariance(all) => all.iter().map(|(_, topic)| topic.is_left()).collect(),
+            Self::Odometry(all) => all.iter().map(|(_, topic)| topic.is_left()).collect(),
+            Self::Array(topic, _) => vec![topic.is_left()],
+        }
+    }
+
     /// Messages that were no message of the type.
     pub fn refused(&self) -> u64 {
         match self {

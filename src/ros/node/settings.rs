@@ -131,7 +131,7 @@ pub(in crate::ros) fn store(declarations: Vec<Declaration>, given: &[Parameter])
     Ok(store)
 }
 
-/// 1000, or what the swarm file has if that is more: more could keep the loop for longer than its period. The node of one robot receives its neighbours' poses alone, which makes one sweep.
+/// 1000, or what the swarm file has if that is more: more could keep the loop for longer than its period. The node of one robot computes that one's target alone, which makes one sweep.
 fn most_sweeps(control: &Control, part: &NodeScope) -> i64 {
     if part.mine.len() == control.formation().count() { (control.sweeps() as i64).max(1000) } else { 1 }
 }

@@ -74,6 +74,15 @@ pub(crate) enum Content {
     },
 }
 
+/// Whether an override sets what stands at a key or below it, so that one of that key after it leaves nothing of it.
+pub fn is_lost_to(text: &str, key: &str) -> bool {
+    let paths = overrides::split_assignment(text)
+        .map(|(path, _)| [path, key].map(|path| overrides::parse_path(path).ok()));
+    let Some([Some(path), Some(key)]) = paths else { return false };
+    let is_same = |(a, b): (&Segment, &Segment)| a == b || a.index().is_some() && a.index() == b.index();
+    path.len() >= key.len() && path.iter().zip(&key).all(is_same)
+}
+
 impl Document {
     /// Parses the text of `file` and lays the overrides, such as `roles\[1\].speed=0.6`, over it in order.
     ///

@@ -40,7 +40,7 @@ pub(crate) fn apply(root: &mut Node, text: &str, origin: Origin) -> Result<(), B
 const PATH_HELP: &str = "key paths look like `lattice.spacing` or `roles[1].motion.kind`";
 
 /// Splits at the first `=` that is not inside a quoted key.
-fn split_assignment(text: &str) -> Option<(&str, &str)> {
+pub(crate) fn split_assignment(text: &str) -> Option<(&str, &str)> {
     let mut quoted = false;
     let is_assignment = |c: char| {
         quoted ^= c == '"';

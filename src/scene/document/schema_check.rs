@@ -179,7 +179,12 @@ impl Checker<'_> {
             Some(key) if now.is_some() => format!("it is called `{key}` now"),
             Some(key) => format!("did you mean `{key}`?"),
             None if known.is_empty() => "no keys are known here".to_owned(),
-            None => format!("known keys: {}", listed(&known)),
+            None => {
+                // One that is there already may be meant all the same: it is not to be among those left out.
+                let near = nearest(name, &known);
+                let others = known.iter().copied().filter(|&key| Some(key) != near);
+                format!("known keys: {}", listed(&near.into_iter().chain(others).collect::<Vec<_>>()))
+            }
         };
         self.refuse(node, path, "is not a known key", Some(help));
         meant

@@ -7,23 +7,19 @@ use serde::{Deserialize, Serialize};
 /// strain energy and the largest von Mises stress of each part, `load.png` the load over the displacement. It
 /// needs a material. With `[equilibrium]` give `increments` or `schedule`; figures and VTK files then count
 /// increments. In a scene that is stepped give `ramp`, `every` or both.
-#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
 pub struct RawLoadSteps {
     /// So many equal parts of the loads and of the leaders' motions, each solved to equilibrium.
-    #[serde(default)]
     #[schemars(range(min = 1, max = 1000000))]
     pub increments: Option<usize>,
     /// Parts of the loads and of the leaders' motions, from 0 to 1, in the order in which they are solved to
     /// equilibrium: one lower than that before it unloads [1].
-    #[serde(default)]
     #[schemars(length(min = 1))]
     pub schedule: Option<Vec<f64>>,
     /// Loads grow with the steps of a sweep, instead of acting from the first one on.
-    #[serde(default)]
     pub ramp: Option<RawRamp>,
     /// Steps of a sweep from one row of `load.csv` to the next; unless given, what leaves about a hundred rows [step].
-    #[serde(default)]
     #[schemars(range(min = 1))]
     pub every: Option<usize>,
 }

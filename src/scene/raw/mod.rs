@@ -106,19 +106,16 @@ pub enum RawFrame {
 }
 
 /// When bonds break, and what stands in for them.
-#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
 pub struct RawFracture {
     /// A bond longer than this breaks: the paper's `df` [length].
-    #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub distance: Option<f64>,
     /// A bond longer than this multiple of its reference length breaks [1].
-    #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 1))]
     pub stretch: Option<f64>,
     /// The substitute for a lost neighbour; a point at the original lattice offset unless given.
-    #[serde(default)]
     pub ghosts: RawGhosts,
 }
 
@@ -147,46 +144,40 @@ pub struct RawCut {
 
 /// When the run ends.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct RawStop {
     /// At the latest after this many steps [step].
-    #[serde(default = "defaults::steps")]
     #[schemars(range(min = 1))]
     pub steps: usize,
     /// As soon as no particle moves farther in a step than this part of the spacing, every scheduled
     /// motion and role change being over [1].
-    #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance: Option<f64>,
     /// The run has diverged once a particle is farther from its reference place than this many times
     /// the body's diagonal [1].
-    #[serde(default = "defaults::divergence_ratio")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub divergence_ratio: f64,
 }
 
 impl Default for RawStop {
     fn default() -> Self {
-        Self { steps: defaults::steps(), tolerance: None, divergence_ratio: defaults::divergence_ratio() }
+        Self { steps: 1000, tolerance: None, divergence_ratio: 1000.0 }
     }
 }
 
 /// The records of the run.
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct RawRecord {
     /// Ids of the particles whose coordinates and pseudo-energies are kept at every step.
-    #[serde(default)]
     pub probes: Vec<usize>,
     /// Places of the undeformed body [x, y] at which `run` reports displacement and stress at the end, and `compare`
     /// sets them beside the reference's; needs a material [length].
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub places: Vec<[f64; 2]>,
     /// Steps at which the configuration is drawn (the last step always is) [step].
-    #[serde(default)]
     pub figures: Vec<usize>,
     /// Every so many steps the configuration is written for ParaView; 0 writes none [step].
-    #[serde(default)]
     pub vtk_every: usize,
 }
 
@@ -202,12 +193,6 @@ mod defaults {
     }
     pub fn one_step() -> usize {
         1
-    }
-    pub fn steps() -> usize {
-        1000
-    }
-    pub fn divergence_ratio() -> f64 {
-        1000.0
     }
     pub fn iterations() -> usize {
         1_000_000

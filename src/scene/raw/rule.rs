@@ -52,22 +52,17 @@ pub enum RawNeighbours {
 
 /// How a follower's position comes from its neighbours'; what is not named is not evaluated.
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct RawRule {
     /// The centre of gravity unless given.
-    #[serde(default)]
     pub mean: Option<RawMean>,
     /// Fixed weights of the neighbours, on top of the mean's own.
-    #[serde(default)]
     pub weights: Option<RawWeights>,
     /// The correction that keeps a particle with unbalanced neighbours in place.
-    #[serde(default)]
     pub rest: RawRest,
     /// The Poisson term (Eq. 2).
-    #[serde(default)]
     pub poisson: Option<RawPoisson>,
     /// Feedback (Eq. 4).
-    #[serde(default)]
     pub feedback: Option<RawFeedback>,
 }
 
@@ -237,14 +232,12 @@ pub enum RawFeedbackReference {
 
 /// How targets become positions.
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct RawUpdate {
     /// The order of updates within one step; all at once unless given.
-    #[serde(default)]
     pub order: RawOrder,
     /// Part of the way to the target that is gone in one step [1]. Unless given, 1; for the rule
     /// `material` swept synchronously, nine tenths of the most at which no wave grows.
-    #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 2))]
     pub damping: Option<f64>,
 }

@@ -34,7 +34,7 @@ pub fn choose(system: &System, request: &Request) -> (Solver, String) {
         return (Solver::Multigrid, "in single precision only iterations are offered".into());
     }
     if followers <= DIRECT_UP_TO {
-        let why = format!("{followers} followers are factorised before an iteration has begun");
+        let why = format!("factorising {followers} followers takes less time than iterating");
         return (Solver::Direct, why);
     }
     if system.is_nearly_incompressible && followers <= INCOMPRESSIBLE_UP_TO {

@@ -3,6 +3,8 @@
 //! The truth is solved on a mesh of the shape, which knows nothing of the lattice; the particles are asked for
 //! afterwards.
 
+use std::collections::BTreeMap;
+
 pub use crate::fem::Effort;
 use crate::fem::{
     self, EstimatedError, FemError, Level, ShapeProblem, ShapeSolution, Strain, Stress, Support, solve_shape,
@@ -201,18 +203,23 @@ fn material(elastic: &Elastic) -> Result<fem::Material, FemError> {
 
 /// Finite elements take forces per area and per volume.
 fn pull<'a>(problem: &mut ShapeProblem<'a>, loads: &'a [Load], reference: &Vectors, thickness: f64) {
+    // However many loads push a particle, it is one point of the mesh.
+    let mut forces: BTreeMap<u32, Point> = BTreeMap::new();
     for load in loads {
         match load {
             Load::Outline(load) => {
                 problem.pull(load.portions.clone(), move |p, n| load.at(p, n).map(|t| t / thickness));
             }
             Load::Particles { particles, force } => {
-                let at = particles.iter().map(|&i| (reference.get(i as usize), *force));
-                problem.point_forces.extend(at);
+                for &i in particles {
+                    let pushed = forces.entry(i).or_insert([0.0; 2]);
+                    *pushed = [0, 1].map(|axis| pushed[axis] + force[axis]);
+                }
             }
             Load::Body(force) => {
                 problem.body_force = [0, 1].map(|axis| problem.body_force[axis] + force[axis] / thickness);
             }
         }
     }
+    problem.point_forces.extend(forces.into_iter().map(|(i, force)| (reference.get(i as usize), force)));
 }

@@ -23,7 +23,7 @@ use crate::flock::vectors::Vectors;
 use crate::geometry::Point;
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
-use crate::scene::{LeaderMotion, Scene, SceneError};
+use crate::scene::{LeaderMotion, Load, Scene, SceneError};
 use crate::solve::stopwatch::Stopwatch;
 
 /// The truth of a scene's body in its material, under its loads, clamps and leaders.
@@ -59,6 +59,8 @@ pub struct Compared {
     pub von_mises_truth: Vec<f64>,
     /// At the scene's `record.places`.
     pub places: Vec<PlaceComparison>,
+    /// Warnings about the truth.
+    pub cautions: Vec<String>,
 }
 
 /// Solves for the truth of a scene: clamped particles and leaders with a motion of their own are held where
@@ -159,6 +161,7 @@ pub fn compare(
     Ok(Compared {
         comparison,
         outcome,
+        cautions: cautions(scene, &truth.solution, effort),
         reference: truth,
         cells,
         rule,
@@ -166,6 +169,25 @@ pub fn compare(
         von_mises_truth,
         places,
     })
+}
+
+/// Why the truth is less true than it was asked to be.
+fn cautions(scene: &Scene, truth: &Reference, effort: &Effort) -> Vec<String> {
+    let pushed = scene.loads.iter().position(|load| matches!(load, Load::Force { .. }));
+    let pushed = pushed.map(|k| {
+        format!(
+            "loads[{k}] pushes single points, where elasticity yields without limit: displacement, energy and stress of the              truth depend on its mesh, and so do the errors against it; a traction on an edge has a truth"
+        )
+    });
+    let own = truth.error().displacement;
+    let missed = (own.is_nan() || own > effort.target).then(|| {
+        format!(
+            "the truth's own error is not known to be below the {:.2e} % asked for, on {} nodes; where single points hold or push              a body no mesh is fine enough",
+            100.0 * effort.target,
+            truth.nodes()
+        )
+    });
+    pushed.into_iter().chain(missed).collect()
 }
 
 /// Whether energies tell the error: those of a body that loads alone or moved supports alone drive, under small rotations.

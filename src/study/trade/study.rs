@@ -74,7 +74,8 @@ pub type Load<'a> = &'a dyn Fn(&[String]) -> Result<Scene, SceneError>;
 /// Runs a scene in every setting of the grid. `progress` is called with each before it runs.
 ///
 /// # Errors
-/// Whatever keeps the scene from having a truth; a setting that is refused is part of the study.
+/// Whatever keeps the scene from having a truth; bodies that are all too large. A setting that is refused is part of the
+/// study.
 pub fn run(load: Load<'_>, grid: &Grid, progress: &mut dyn FnMut(&Setting)) -> Result<Study, SceneError> {
     let scene = load(&[])?;
     let truth = finest_reference(load, &scene, grid)?;
@@ -87,12 +88,17 @@ pub fn run(load: Load<'_>, grid: &Grid, progress: &mut dyn FnMut(&Setting)) -> R
         repeats: grid.repeats,
         points: Vec::new(),
     };
+    let mut least_left_out: Option<usize> = None;
     for rule in RuleChoice::ALL {
         for &spacing in &grid.spacings {
             let overrides = body_overrides(&scene, rule, spacing);
             let particles = match load(&overrides).and_then(|scene| plan_led_by(&scene, &truth.solution)) {
                 Ok(plan) if plan.count() <= grid.max_particles => plan.count(),
-                Ok(_) => continue,
+                Ok(plan) => {
+                    least_left_out =
+                        Some(least_left_out.map_or(plan.count(), |least| least.min(plan.count())));
+                    continue;
+                }
                 Err(error) => {
                     study.points.push(refused(rule, spacing, &error));
                     continue;
@@ -112,7 +118,18 @@ pub fn run(load: Load<'_>, grid: &Grid, progress: &mut dyn FnMut(&Setting)) -> R
             }
         }
     }
-    Ok(study)
+    let is_tried = |point: &Point| !matches!(point.outcome, Outcome::Refused { .. });
+    match least_left_out {
+        Some(least) if !study.points.iter().any(is_tried) => Err(scene.refuse(
+            "body",
+            format!(
+                "no setting is left: the smallest body has {least} particles, beyond the {} allowed",
+                grid.max_particles
+            ),
+            "allow more (--max-particles), or give a smaller body",
+        )),
+        _ => Ok(study),
+    }
 }
 
 /// The truth of the finest body that is within bounds.

@@ -397,13 +397,13 @@ impl Control {
         self.watch.look(now);
         self.flags.fill(0);
         for member in 0..self.formation.count() {
-            let last = self.watch.last(member);
-            self.known[member] = last.is_some();
+            let place = self.watch.place(member);
+            self.known[member] = place.is_some();
             self.usable[member] = self.watch.health(member).is_usable();
-            // The place of a lost member is unknown: an age beyond the limit carries no more information.
-            let age = self.watch.age(member, now).unwrap_or(0.0);
-            self.ages[member] = age.min(self.watch.limits().age_limit);
-            self.present.set(member, last.map_or([f64::NAN; 2], |pose| pose.position));
+            // Where a lost member has gone is unknown: an age beyond the limit carries no more information.
+            let age = self.watch.age(member, now).unwrap_or(f64::INFINITY);
+            self.ages[member] = if place.is_some() { age.min(self.watch.limits().age_limit) } else { 0.0 };
+            self.present.set(member, place.unwrap_or([f64::NAN; 2]));
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::Control;
 use crate::scene::swarm::Swarm;
+use crate::scene::swarm::raw::RawHears;
 
 /// The members that a loop serves, and those whose poses it receives. By number, ascending.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -49,16 +50,28 @@ impl NodeScope {
             }
             Some(name) => {
                 let m = only(swarm, control, name)?;
-                let mut heard = formation.depends_on(m);
-                heard.push(m);
-                heard.sort_unstable();
-                Self { mine: vec![m], heard }
+                Self { mine: vec![m], heard: heard(swarm, control, m) }
             }
         };
         control.listen_to(&part.heard);
         control.serve(&part.mine);
         Ok(part)
     }
+}
+
+/// The members whose poses the loop of one needs, by number, ascending. Its target follows from its neighbours; to keep
+/// a clearance it has to see everyone, for programs and commands may bring any two together.
+pub fn heard(swarm: &Swarm, control: &Control, member: usize) -> Vec<usize> {
+    let formation = control.formation();
+    let keeps_clear = control.limits().keeps_apart && swarm.raw.node.hears == RawHears::All;
+    let finds_anew = formation.engine().is_some_and(|engine| engine.lasting_neighbours().is_none());
+    if keeps_clear || finds_anew {
+        return (0..formation.count()).collect();
+    }
+    let mut heard = formation.depends_on(member);
+    heard.push(member);
+    heard.sort_unstable();
+    heard
 }
 
 /// The number of the robot that the loop is alone for.

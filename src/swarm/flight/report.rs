@@ -30,8 +30,12 @@ pub struct FlightReport {
     pub affine_error: Option<[f64; 2]>,
     /// Largest, and at the end; absent where the rule has no single place of rest.
     pub formation_error: Option<[f64; 2]>,
+    /// When the leaders' programs end; absent where they never do.
+    pub programs_end: Option<f64>,
+    /// Whether the flight lasted until then. Before, there is neither a settling time nor an end to be at.
+    pub programs_ended: bool,
     /// Time after which the formation stayed within `settled_within` of its shape, counted from the end of the
-    /// leaders' programs; absent where it never was.
+    /// leaders' programs; absent where it never was, or where they did not end.
     pub settling_time: Option<f64>,
     /// Distance from its shape up to which the formation counts as settled.
     pub settled_within: f64,
@@ -114,9 +118,16 @@ impl FlightReport {
             format!("largest {} m, at the end {} m", number(largest), number(last))
         };
         let within = number(self.settled_within);
-        let settled = match self.settling_time {
-            Some(time) => format!("{} s to within {within} m", number(time)),
-            None => format!("never within {within} m"),
+        let settled = match (self.settling_time, self.programs_end) {
+            (Some(time), _) => format!("{} s to within {within} m", number(time)),
+            (None, _) if self.programs_ended => format!("never within {within} m"),
+            (None, Some(end)) => {
+                format!(
+                    "not measured: the flight ends before the leaders' programs, which take {} s",
+                    number(end)
+                )
+            }
+            (None, None) => "not measured: the leaders' programs never end".to_owned(),
         };
         let clearance = self.clearance.map(|clearance| {
             let closest = self.closest.as_ref().map_or(String::new(), |moment| format!(": {moment}"));
@@ -143,6 +154,11 @@ impl FlightReport {
         let samples = &record.samples;
         let leaders = (0..formation.count()).filter(|&m| formation.leads(m)).count();
         let bounds = &swarm.raw.flight.bounds;
+        let programs_end = formation.programs_end();
+        // The last period may end short of them by rounding.
+        let programs_ended =
+            flight.control().program_time() >= programs_end - 0.5 * flight.control().period();
+        let settling_time = settling_time(samples, programs_end, bounds.settled_within);
         let mut report = Self {
             name: swarm.name.clone(),
             title: swarm.raw.title.clone(),
@@ -154,7 +170,9 @@ impl FlightReport {
             periods: flight.fleet().period(),
             affine_error: largest_and_last(samples, |s| s.affine_error),
             formation_error: largest_and_last(samples, |s| s.formation_error),
-            settling_time: settling_time(samples, formation.programs_end(), bounds.settled_within),
+            programs_end: finite(programs_end),
+            programs_ended,
+            settling_time: settling_time.filter(|_| programs_ended),
             settled_within: bounds.settled_within,
             closest: record.closest.map(|closest| closest.named(&formation.names)),
             clearance: finite(samples.iter().map(|s| s.clearance).fold(f64::INFINITY, f64::min)),
@@ -240,11 +258,14 @@ fn verdicts(
     let [affine, rest, continuum] = [0, 1, 2];
     let shape = if report.affine_error.is_some() { affine } else { rest };
     // A robot that is lost to the end has not flown to its place, wherever that is by now.
-    let last = report.affine_error.or(report.formation_error).map(|[_, last]| last).filter(|_| !any_lost);
+    let is_final = report.programs_ended && !any_lost;
+    let last = report.affine_error.or(report.formation_error).map(|[_, last]| last).filter(|_| is_final);
     let farthest = |which: usize| record.farthest.iter().filter_map(move |all| all[which]);
     let largest = |which| farthest(which).max_by(|a, b| a.value.total_cmp(&b.value));
     // The robot that kept the formation from being settled.
     let unsettled = farthest(shape).rfind(|one| one.value > bounds.settled_within);
+    let [unsettled, at_end] =
+        [unsettled, farthest(shape).next_back()].map(|one| one.filter(|_| report.programs_ended));
     let all = [
         at_most(
             "affine_error",
@@ -252,7 +273,7 @@ fn verdicts(
             report.affine_error.map(|[most, _]| most),
             largest(affine),
         ),
-        at_most("final_error", bounds.final_error, last, farthest(shape).next_back()),
+        at_most("final_error", bounds.final_error, last, at_end),
         at_most("settling_time", bounds.settling_time, report.settling_time, unsettled),
         at_most("continuum_error", bounds.continuum_error, report.continuum_error, largest(continuum)),
         bounds.clearance.map(|declared| Verdict {

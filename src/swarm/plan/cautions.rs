@@ -1,6 +1,7 @@
 //! Warnings before a flight that follow from the file and the formation's places alone.
 
 use super::{ManoeuvreSpeed, largest_noise, needed};
+use crate::continuum::late::beyond;
 use crate::flock::manoeuvre::Manoeuvre;
 use crate::flock::motion::{Keyframe, Motion};
 use crate::flock::vectors::distance;
@@ -31,6 +32,8 @@ pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
     let one = [
         noise(raw, formation),
         delay(raw),
+        late_faults(flight, raw),
+        late_commands(flight, raw),
         (raw.flight.loss >= 1.0)
             .then(|| "every pose is lost: no robot will get a target; lower flight.loss".to_owned()),
         silent(raw, flight),
@@ -72,15 +75,31 @@ fn delay(raw: &RawSwarm) -> Option<String> {
     })
 }
 
-/// Robots that move on while nobody hears where, at any speed.
+/// Robots that move on unheard, at any speed.
 fn silent(raw: &RawSwarm, flight: &Flight) -> Option<String> {
     use RawFaultKind::{NotANumber, Silent, WrongFrame};
     late_without_speed(flight.control().limits())?;
     let fault = raw.flight.faults.iter().find(|one| matches!(one.what, Silent | NotANumber | WrongFrame))?;
     Some(format!(
-        "nobody knows how far `{}` goes once it is not heard: no clearance from it is kept; give limits.speed",
+        "how far `{}` goes once it is not heard is unknown: no clearance from it is kept; give limits.speed",
         fault.robot
     ))
+}
+
+/// Faults that begin when the flight is over. What is done at its very end is how a session that was saved there ended.
+fn late_faults(flight: &Flight, raw: &RawSwarm) -> Option<String> {
+    let end = flight.periods() as f64 * raw.control.period;
+    let late = raw.flight.faults.iter().enumerate().filter(|(_, fault)| fault.at > end);
+    let keys = late.map(|(k, fault)| format!("flight.faults[{k}].at = {}", fault.at));
+    beyond(&format!("the end of the flight, at {end} s"), keys, "flight.duration")
+}
+
+/// Commands for periods that are not flown.
+fn late_commands(flight: &Flight, raw: &RawSwarm) -> Option<String> {
+    let periods = flight.periods();
+    let late = raw.flight.commands.iter().enumerate().filter(|(_, command)| command.after > periods);
+    let keys = late.map(|(k, command)| format!("flight.commands[{k}].after = {}", command.after));
+    beyond(&format!("the end of the flight, after {periods} periods"), keys, "flight.duration")
 }
 
 /// Robots that no leader reaches by links that last.

@@ -159,7 +159,7 @@ impl SwarmPlan {
             neighbours: neighbours(formation),
             spacing: formation.spacing(),
             free_space: free_space(formation),
-            model: model(&raw.flight.model),
+            model: flight.fleet().model().name(),
             period_s: period,
             sweeps: raw.control.sweeps,
             flight_s: flight.periods() as f64 * period,
@@ -184,15 +184,6 @@ impl SwarmPlan {
         let real = cautions::late_without_speed(flight.control().limits()).map(str::to_owned);
         plan.cautions = lasting(&plan).into_iter().chain(cautions::of(swarm, &flight)).chain(real).collect();
         Ok(plan)
-    }
-}
-
-fn model(model: &RawModel) -> &'static str {
-    match model {
-        RawModel::Ideal => "ideal",
-        RawModel::Integrator => "integrator",
-        RawModel::Unicycle { .. } => "unicycle",
-        RawModel::DoubleIntegrator => "double-integrator",
     }
 }
 
@@ -263,23 +254,7 @@ fn speed(swarm: &Swarm, formation: &Formation, map: Option<&PeriodMap>, delay: f
 
 /// The largest speed of a place in a manoeuvre.
 fn needed(formation: &Formation, name: &str) -> Option<ManoeuvreSpeed> {
-    /// Parts of a leg between which speeds are taken; even, so that the fastest instant of a leg, its middle, is one.
-    const PARTS: usize = 100;
-    let manoeuvre = formation.manoeuvre(name, 0.0)?;
-    let mut needed: f64 = 0.0;
-    let mut start = 0.0;
-    for leg in &manoeuvre.legs {
-        let part = leg.seconds / PARTS as f64;
-        for n in 0..PARTS {
-            // Centred on the middle of the leg for n = PARTS / 2.
-            let middle = start + n as f64 * part;
-            let [before, after] = [middle - 0.5 * part, middle + 0.5 * part].map(|t| manoeuvre.affine(t));
-            let moved =
-                formation.places.iter().map(|place| distance(before.apply(place), after.apply(place)));
-            needed = moved.map(|way| way / part).fold(needed, f64::max);
-        }
-        start += leg.seconds + leg.hold;
-    }
+    let needed = formation.manoeuvre(name, 0.0)?.demand(&formation.places).speed;
     Some(ManoeuvreSpeed { name: name.to_owned(), needed })
 }
 

@@ -46,6 +46,19 @@ fn what_the_file_cannot_hold_is_warned_of() {
     assert!(late.cautions.iter().any(|caution| caution.contains("no robot will get a target")), "{late}");
     let jittery = plan("square", &["flight.jitter=100"]);
     assert!(jittery.cautions.iter().any(|caution| caution.contains("lost for periods")), "{jittery}");
+    let after = plan(
+        "square",
+        &[
+            "flight.faults=[{ robot = \"robot_1\", at = 74.0, what = { kind = \"dead\" } }, \
+         { robot = \"robot_2\", at = 500.0, what = { kind = \"dead\" } }]",
+            "flight.commands=[{ after = 9999999, what = { kind = \"lead\", robot = \"robot_1\", to = [0.0, 0.0] } }]",
+        ],
+    );
+    for key in
+        ["at 75 s, and without effect: flight.faults[1].at = 500;", ": flight.commands[0].after = 9999999;"]
+    {
+        assert!(after.cautions.iter().any(|caution| caution.contains(key)), "{after}");
+    }
     assert!(!jittery.to_string().contains("no robot will get a target"), "{jittery}");
 }
 

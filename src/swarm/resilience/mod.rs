@@ -12,7 +12,7 @@
 
 mod support;
 
-pub use support::{Unsupported, most_supported, supported};
+pub use support::{Unsupported, supported};
 
 /// The coordinates that are left out together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

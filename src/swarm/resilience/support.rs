@@ -89,14 +89,6 @@ pub fn supported(neighbours: &Neighbours, leaders: &[bool], f: usize, trim: Trim
     }
 }
 
-/// The most liars among the neighbours of each member that are tolerated; `None` where some follower is linked
-/// to no leader at all.
-pub fn most_supported(neighbours: &Neighbours, leaders: &[bool], trim: Trim) -> Option<usize> {
-    // Without followers there is no bound; counts above the number of neighbours mean nothing.
-    let most = (0..neighbours.count()).map(|member| neighbours.of(member).len()).max().unwrap_or(0);
-    (0..=most).take_while(|&f| supported(neighbours, leaders, f, trim).is_ok()).last()
-}
-
 /// Starts from the leaders and adds members with enough neighbours in the set until none is left to add. Returns
 /// the set, and the number of each member's neighbours in it.
 fn percolate(neighbours: &Neighbours, leaders: &[bool], needed: usize) -> (Vec<bool>, Vec<usize>) {
@@ -151,12 +143,17 @@ mod tests {
             square(Neighbourhood::Chebyshev { radius: 1 }),
             square(Neighbourhood::Chebyshev { radius: 2 }),
         );
-        assert_eq!(most_supported(&four, &ring(), Trim::PerAxis), Some(0));
-        assert_eq!(most_supported(&eight, &ring(), Trim::PerAxis), Some(1));
-        assert_eq!(most_supported(&eight, &columns(1), Trim::PerAxis), Some(1));
-        assert_eq!(most_supported(&twenty_four, &columns(2), Trim::PerAxis), Some(3));
-        assert_eq!(most_supported(&eight, &ring(), Trim::Whole), Some(0));
-        assert_eq!(most_supported(&twenty_four, &columns(2), Trim::Whole), Some(1));
+        for (neighbours, leaders, trim, most) in [
+            (&four, ring(), Trim::PerAxis, 0),
+            (&eight, ring(), Trim::PerAxis, 1),
+            (&eight, columns(1), Trim::PerAxis, 1),
+            (&twenty_four, columns(2), Trim::PerAxis, 3),
+            (&eight, ring(), Trim::Whole, 0),
+            (&twenty_four, columns(2), Trim::Whole, 1),
+        ] {
+            let is_supported = |f| supported(neighbours, &leaders, f, trim).is_ok();
+            assert!((0..=most).all(is_supported) && !is_supported(most + 1), "{trim:?} {most}");
+        }
     }
 
     #[test]
@@ -176,7 +173,6 @@ mod tests {
     fn without_liars_it_is_whether_a_leader_is_heard() {
         let chain = Neighbours::from_lists([vec![], vec![0], vec![1], vec![4], vec![3]]);
         let leaders = [true, false, false, false, false];
-        assert_eq!(most_supported(&chain, &leaders, Trim::PerAxis), None);
         let refusal = supported(&chain, &leaders, 0, Trim::PerAxis).expect_err("two hear each other only");
         assert!(matches!(refusal, Unsupported::NotReached { member: 3, reached: 0, .. }), "{refusal:?}");
         assert_eq!(supported(&chain, &[true, false, false, true, false], 0, Trim::PerAxis), Ok(()));

@@ -6,8 +6,9 @@
 //! * **Other members** by buffered Voronoi cells (D. Zhou, Z. Wang, S. Bandyopadhyay, M. Schwager,
 //!   "Fast, on-line collision avoidance for dynamic vehicles using buffered Voronoi cells", IEEE RA-L
 //!   2017). Of the free gap `d - r_i - r_j - clearance` between two members each takes half. Positions
-//!   alone decide, and a member's target takes only its own and its neighbours': a node that serves one
-//!   member gives the same bits as one that serves all.
+//!   alone decide, and of those only the ones in reach: a node that serves one member and hears all
+//!   ([`NodeScope`](super::control::scope::NodeScope)) gives the same bits as one that serves all, except for members
+//!   that brake, whose targets it would have to know.
 //! * **Obstacles and geofence** by the plane through the nearest point of every edge in reach
 //!   ([`Obstacles`]), and a shape cast along the way as a second opinion.
 //! * **Deadlock** by keeping to the right ([`Patience`]).

@@ -211,7 +211,8 @@ impl Filter {
         let detour = &mut self.detours[member];
         let goal = if detour.is_active() {
             flags.0 |= Flags::RESOLVING_DEADLOCK;
-            self.cell.nearest(detour.aim(way), scale.min(reach))
+            // Its room to brake is in the borders: that up to the goal, which may be none, is that of the straight way.
+            self.cell.nearest(detour.aim(way), scale)
         } else {
             direct
         };

@@ -6,6 +6,7 @@
 //! finite is ever returned.
 
 mod limits;
+mod placing;
 mod ranges;
 mod rejection;
 mod track;
@@ -83,6 +84,11 @@ struct Member {
     health: Health,
     /// Newest pose believed.
     accepted: Option<Pose>,
+    /// Where it was last known to be \[m\]: by a pose that was believed or by ranges. It outlasts the pose, since the member
+    /// has not left the world.
+    place: Option<[f64; 2]>,
+    /// Whether ranges have contradicted a pose and confirmed none since.
+    is_doubted: bool,
     /// Newest pose of a run that is consistent in itself and not yet believed, and how many are in it.
     candidate: Option<(Pose, u32)>,
     /// Shortest time between two stamps of late, which is the member's own period \[s\].
@@ -94,7 +100,8 @@ impl Watch {
     /// All members waiting.
     pub fn new(members: usize, limits: WatchLimits) -> Self {
         let (health, counts) = (Health::Waiting, Counts::default());
-        let member = Member { health, accepted: None, candidate: None, shortest: None, counts };
+        let (accepted, place, candidate, shortest) = (None, None, None, None);
+        let member = Member { health, accepted, place, is_doubted: false, candidate, shortest, counts };
         Self { limits, members: vec![member; members], ranges: vec![Vec::new(); members], clock: None }
     }
 
@@ -125,6 +132,7 @@ impl Watch {
         for member in &mut self.members {
             member.health = self.limits.health(member.age(now));
         }
+        self.place_doubted(now);
     }
 
     /// As of the last look, or the last pose accepted since.
@@ -143,9 +151,10 @@ impl Watch {
         member.accepted.filter(|_| member.health.is_usable())
     }
 
-    /// The newest pose believed, whatever its age: to show, not to use.
-    pub fn last(&self, member: usize) -> Option<Pose> {
-        self.members[member].accepted
+    /// Where the member was last known to be \[m, world frame\], however long ago: to keep clear of, not to follow. Once
+    /// known it is never lost.
+    pub fn place(&self, member: usize) -> Option<[f64; 2]> {
+        self.members[member].place
     }
 
     /// Age of the newest pose believed \[s\]; zero where its sender's clock runs ahead.
@@ -174,7 +183,7 @@ impl Watch {
 }
 
 impl Member {
-    /// Forgets every pose.
+    /// Forgets every pose, and not that the member is somewhere, nor that it is doubted.
     fn forget(&mut self) {
         (self.health, self.accepted, self.candidate) = (Health::Waiting, None, None);
     }
@@ -230,8 +239,8 @@ impl Member {
             self.shortest = Some(GROWTH * own);
         }
         self.counts.accepted += 1;
-        self.accepted = Some(pose);
-        self.candidate = None;
+        (self.accepted, self.place) = (Some(pose), Some(pose.position));
+        (self.candidate, self.is_doubted) = (None, false);
         self.health = limits.health(self.age(now));
     }
 }

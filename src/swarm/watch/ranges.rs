@@ -6,11 +6,14 @@
 //! perpendicular bisector of the two places. So every lie beyond the tolerance is found where more honest observers
 //! than may lie stand beside any such line.
 //!
+//! A member whose pose was contradicted is doubted until ranges leave no place but the one it says: that nobody measures it
+//! any more confirms nothing. Until then it stays where it was last known to be, by its pose or by ranges ([`Places`]).
+//!
 //! Ranges of the last while are kept, each with the place of its observer at the time: a pose is held against those of its
 //! own time, whatever time it claims, and gains nothing by a stamp of the past.
 
+use super::placing::{Places, Ring};
 use super::{Pose, Rejection, Watch, WatchLimits};
-use crate::flock::vectors::distance;
 
 /// A distance that one member measured of another.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,44 +97,78 @@ impl Watch {
         true
     }
 
-    /// Refuses a pose that too many contradict. A pose that was believed before anyone had measured is forgotten if it
-    /// is contradicted too: the member then waits as if it had never been heard.
+    /// Refuses a pose that too many contradict, and from then on all that ranges do not confirm: where nobody measures a
+    /// liar it is a liar still. A pose that was believed before anyone had measured is dropped if it is contradicted too:
+    /// the member then waits as if it had never been heard, but for its place.
     pub(super) fn weigh_by_ranges(&mut self, member: usize, pose: &Pose) -> Result<(), Rejection> {
-        let verdict = self.contradicted(member, pose);
-        if verdict.is_err()
-            && let Some(accepted) = self.members[member].accepted
-            && self.contradicted(member, &accepted).is_err()
-        {
-            self.members[member].forget();
+        let Some(RangeLimits { max_faulty, .. }) = self.limits.ranges else { return Ok(()) };
+        let rings = self.rings(member, pose.stamp);
+        if let Err(contradicted) = weigh(&rings, pose, max_faulty) {
+            let accepted = self.members[member].accepted;
+            let is_false = |last: Pose| weigh(&self.rings(member, last.stamp), &last, max_faulty).is_err();
+            let was_false = accepted.is_some_and(is_false);
+            let watched = &mut self.members[member];
+            watched.is_doubted = true;
+            if was_false {
+                watched.forget();
+            }
+            return Err(contradicted);
         }
-        verdict
+        if !self.members[member].is_doubted {
+            return Ok(());
+        }
+        let mut places = Places::of(&rings, max_faulty);
+        if let Some(last) = self.members[member].accepted {
+            // One that is not used gets no target, and stands by then.
+            let time = (pose.stamp - last.stamp).clamp(0.0, self.limits.age_limit);
+            places = places.within(self.limits.way(time), last.position);
+        }
+        let measured = rings.len();
+        if places.are_only(pose.position) { Ok(()) } else { Err(Rejection::Unconfirmed { measured }) }
     }
 
-    fn contradicted(&self, member: usize, pose: &Pose) -> Result<(), Rejection> {
-        let Some(RangeLimits { tolerance, max_faulty }) = self.limits.ranges else { return Ok(()) };
-        let (mut measured, mut against) = (0, 0);
-        for one in &self.ranges[member] {
-            let Some(present) = self.pose(one.observer) else { continue };
-            let (range, then) = one.at(pose.stamp);
-            if (pose.stamp - range.stamp).abs() > self.limits.age_limit {
-                continue;
+    /// Moves members that are doubted, and have no pose to use, to where ranges leave no other place.
+    pub(super) fn place_doubted(&mut self, now: f64) {
+        let Some(RangeLimits { max_faulty, .. }) = self.limits.ranges else { return };
+        for member in 0..self.members.len() {
+            let watched = &self.members[member];
+            if watched.is_doubted
+                && !watched.health.is_usable()
+                && let Some(place) = Places::of(&self.rings(member, now), max_faulty).only()
+            {
+                self.members[member].place = Some(place);
             }
-            measured += 1;
+        }
+    }
+
+    /// What was measured of a member about a time \[s\], by those that have a pose.
+    fn rings(&self, member: usize, stamp: f64) -> Vec<Ring> {
+        let Some(RangeLimits { tolerance, .. }) = self.limits.ranges else { return Vec::new() };
+        let ring = |one: &Measured| {
+            let present = self.pose(one.observer)?;
+            let (range, then) = one.at(stamp);
+            if (stamp - range.stamp).abs() > self.limits.age_limit {
+                return None;
+            }
             // The pose known at the time, or the present one: the nearer in time.
             let away = |observer: &Pose| (observer.stamp - range.stamp).abs();
             let observer = then.filter(|then| away(then) <= away(&present)).unwrap_or(present);
-            let allowed = tolerance
-                + self.limits.way(pose.stamp - range.stamp)
+            let slack = tolerance
+                + self.limits.way(stamp - range.stamp)
                 + self.limits.way(observer.stamp - range.stamp);
-            if (distance(pose.position, observer.position) - range.distance).abs() > allowed {
-                against += 1;
-            }
-        }
-        if against > max_faulty {
-            return Err(Rejection::Contradicted { against, measured, max_faulty });
-        }
-        Ok(())
+            Some(Ring { centre: observer.position, radius: range.distance, slack })
+        };
+        self.ranges[member].iter().filter_map(ring).collect()
     }
+}
+
+/// Refuses a pose that the rings of too many do not hold.
+fn weigh(rings: &[Ring], pose: &Pose, max_faulty: usize) -> Result<(), Rejection> {
+    let against = rings.iter().filter(|ring| !ring.holds(pose.position)).count();
+    if against > max_faulty {
+        return Err(Rejection::Contradicted { against, measured: rings.len(), max_faulty });
+    }
+    Ok(())
 }
 
 impl WatchLimits {
@@ -146,6 +183,7 @@ impl WatchLimits {
 mod tests {
     use super::super::Health;
     use super::*;
+    use crate::flock::vectors::distance;
 
     /// Four in the corners of a square of 4 m and one in its middle.
     const PLACES: [[f64; 2]; 5] = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0], [2.0, 2.0]];
@@ -209,7 +247,7 @@ mod tests {
             }
         }
         assert!(!watch.health(4).is_usable());
-        assert!(watch.last(4).is_some_and(|pose| pose.position[0] < 2.35), "the last believed stays");
+        assert!(watch.place(4).is_some_and(|[x, _]| x < 2.35), "the last believed stays");
     }
 
     #[test]
@@ -252,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_believed_before_anyone_had_measured_is_forgotten() {
+    fn a_place_believed_before_anyone_had_measured_gives_way_to_the_measured_one() {
         let mut watch = watch();
         for (m, &place) in PLACES[..4].iter().enumerate() {
             watch.receive(m, pose(place, 0.0), 0.0).expect("a first pose");
@@ -261,8 +299,62 @@ mod tests {
         assert_eq!(watch.position(4), Some([9.0, 9.0]));
         let verdicts = period(&mut watch, 0.1, [9.0, 9.0], true_distance);
         assert!(verdicts[4].is_err() && verdicts[..4].iter().all(Result::is_ok));
-        assert_eq!((watch.health(4), watch.last(4)), (Health::Waiting, None));
+        assert_eq!((watch.health(4), watch.position(4)), (Health::Waiting, None));
+        assert_eq!(watch.place(4), Some([9.0, 9.0]), "it is somewhere");
+        watch.look(0.15);
+        let place = watch.place(4).expect("known");
+        assert!(distance(place, PLACES[4]) < 0.2, "{place:?}");
         assert_eq!(period(&mut watch, 0.2, PLACES[4], true_distance)[4], Ok(()), "the truth is believed");
+    }
+
+    #[test]
+    fn one_found_lying_is_not_believed_where_nobody_measures_it_and_stays_where_it_was() {
+        let mut watch = watch();
+        let send = |watch: &mut Watch, now: f64, claims: [f64; 2], observers: &[usize]| {
+            for &observer in observers {
+                let range = Range { observer, of: 4, distance: true_distance(observer, 4), stamp: now };
+                assert!(watch.receive_range(range, now));
+            }
+            watch.look(now);
+            for (m, &place) in PLACES[..4].iter().enumerate() {
+                watch.receive(m, pose(place, now), now).expect("no one measures it");
+            }
+            watch.receive(4, pose(claims, now), now)
+        };
+        // Farther off than it can go while ranges are remembered.
+        let lie = [2.0, 5.0];
+        assert_eq!(send(&mut watch, 0.0, PLACES[4], &[0, 1, 2, 3]), Ok(()));
+        assert!(matches!(
+            send(&mut watch, 0.1, lie, &[0, 1, 2, 3]),
+            Err(Rejection::Contradicted { against: 4, .. })
+        ));
+        let mut now = 0.1;
+        let mut for_a_while = |watch: &mut Watch, claims, observers: &[usize]| {
+            for k in 0..50 {
+                now += 0.1;
+                let verdict = send(watch, now, claims, observers);
+                // At first the ranges of before are remembered.
+                let is_remembered = k < 10 && matches!(verdict, Err(Rejection::Contradicted { .. }));
+                let is_unconfirmed = matches!(verdict, Err(Rejection::Unconfirmed { .. }));
+                assert!(is_unconfirmed || is_remembered, "{now}: {verdict:?}");
+            }
+            assert_eq!(
+                (watch.health(4), watch.place(4).map(|at| at.map(|x| (1e9 * x).round() / 1e9))),
+                (Health::Stopped, Some(PLACES[4]))
+            );
+        };
+        for_a_while(&mut watch, lie, &[]);
+        // One range confirms no place, a true one no more than a false one.
+        for_a_while(&mut watch, PLACES[4], &[0]);
+        watch.look(-1.0);
+        assert_eq!(
+            (watch.health(4), watch.place(4).map(|at| at.map(|x| (1e9 * x).round() / 1e9))),
+            (Health::Waiting, Some(PLACES[4])),
+            "the clock is set back"
+        );
+        assert!(matches!(send(&mut watch, -1.0, lie, &[]), Err(Rejection::Unconfirmed { measured: 0 })));
+        assert_eq!(send(&mut watch, -0.9, PLACES[4], &[0, 1, 2, 3]), Ok(()), "there is no other place");
+        assert_eq!(send(&mut watch, -0.8, PLACES[4], &[]), Ok(()), "and it is one like others again");
     }
 
     #[test]

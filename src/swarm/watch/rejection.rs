@@ -79,6 +79,15 @@ pub enum Rejection {
         /// How many may disagree.
         max_faulty: usize,
     },
+    /// Ranges have contradicted the member before, and do not confirm this pose.
+    #[error(
+        "a pose of a robot that ranges have contradicted, and the ranges of {measured} robots leave it other places: it is \
+         believed again where those of enough others leave none"
+    )]
+    Unconfirmed {
+        /// Members that have measured.
+        measured: usize,
+    },
     /// A good pose of a member that was stopped.
     #[error("a pose of a stopped member: {seen} of the {recover} good ones in a row that it needs to go on")]
     Recovering {
@@ -100,6 +109,7 @@ impl Rejection {
             Rejection::TooOld { .. } => Some("too old"),
             Rejection::Jump { .. } => Some("jump"),
             Rejection::Contradicted { .. } => Some("contradicted by ranges"),
+            Rejection::Unconfirmed { .. } => Some("not confirmed by ranges"),
             Rejection::NotNewer { .. } | Rejection::Recovering { .. } => None,
         }
     }
@@ -129,6 +139,8 @@ pub struct Counts {
     pub jumps: u64,
     /// Rejections as [`Rejection::Contradicted`].
     pub contradicted: u64,
+    /// Rejections as [`Rejection::Unconfirmed`].
+    pub unconfirmed: u64,
     /// Rejections as [`Rejection::Recovering`].
     pub recovering: u64,
 }
@@ -144,6 +156,7 @@ impl Counts {
             + self.not_newer
             + self.jumps
             + self.contradicted
+            + self.unconfirmed
             + self.recovering
     }
 
@@ -157,6 +170,7 @@ impl Counts {
             Rejection::NotNewer { .. } => &mut self.not_newer,
             Rejection::Jump { .. } => &mut self.jumps,
             Rejection::Contradicted { .. } => &mut self.contradicted,
+            Rejection::Unconfirmed { .. } => &mut self.unconfirmed,
             Rejection::Recovering { .. } => &mut self.recovering,
         };
         *counter += 1;

@@ -44,7 +44,7 @@ fn a_pose_ages_from_fresh_to_stopped() {
         assert_eq!(watch.position(0), health.is_usable().then_some([1.0, 0.0]), "at {now}");
         assert_eq!(watch.health(1), Health::Waiting, "the other member is another");
     }
-    assert_eq!(watch.last(0), Some(pose(1.0, 10.0)));
+    assert_eq!(watch.place(0), Some([1.0, 0.0]));
     assert!((watch.age(0, 11.01).expect("heard") - 1.01).abs() < 1e-12);
 }
 
@@ -69,7 +69,7 @@ fn each_kind_of_bad_pose_is_turned_away_for_its_reason() {
     for (bad, is_reason) in &rows {
         let rejection = watch.receive(0, *bad, 10.0).expect_err("bad");
         assert!(is_reason(&rejection), "{rejection}");
-        assert_eq!((watch.health(0), watch.last(0)), (Health::Waiting, None), "{rejection}");
+        assert_eq!((watch.health(0), watch.place(0)), (Health::Waiting, None), "{rejection}");
     }
     let counts = *watch.counts(0);
     let reasons =
@@ -171,6 +171,7 @@ fn after_a_clock_is_set_back_every_member_waits_for_new_poses() {
     assert_eq!(watch.health(0), Health::Fresh, "within the skew");
     watch.look(0.0);
     assert_eq!((watch.health(0), watch.position(0), watch.age(0, 0.0)), (Health::Waiting, None, None));
+    assert_eq!(watch.place(0), Some([0.0, 0.0]), "it is still somewhere");
     watch.receive(0, pose(50.0, 0.1), 0.1).expect("nothing to jump from");
     assert_eq!(watch.counts(0).accepted, 2);
 }

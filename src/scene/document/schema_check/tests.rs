@@ -214,7 +214,11 @@ fn a_key_like_no_other_lists_the_known_ones() {
 
 #[test]
 fn a_key_that_is_already_there_is_not_suggested() {
-    assert!(!lattice_report("spacings = 2").contains("did you mean `spacing`"));
+    let report = lattice_report("spacings = 2");
+    assert!(
+        !report.contains("did you mean `spacing`") && report.contains("known keys: `spacing`, "),
+        "{report}"
+    );
 }
 
 #[test]

@@ -3,57 +3,43 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::defaults;
-
 /// The simulation of `flockform swarm` and `flockform robots`.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct RawFlight {
     /// [s]; a scene flies for as many periods as it has steps unless this is given.
-    #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub duration: Option<f64>,
     /// Same seed, same flight.
-    #[serde(default)]
     pub seed: u64,
     /// The model of every robot; at its target after a period unless given.
-    #[serde(default)]
     pub model: RawModel,
     /// Standard deviation of each coordinate of a pose [m]. Robots keep three of it farther away from everything, each.
-    #[serde(default)]
     #[schemars(range(min = 0))]
     pub noise: f64,
     /// Delay of poses [period].
-    #[serde(default)]
     #[schemars(range(max = 1000))]
     pub delay: u32,
     /// Most that is added to the delay at random [period]. Poses keep their order: one that takes long holds back those behind it.
-    #[serde(default)]
     #[schemars(range(max = 1000))]
     pub jitter: u32,
     /// Part of the poses that is lost [1].
-    #[serde(default)]
     #[schemars(range(min = 0, max = 1))]
     pub loss: f64,
     /// Part of the poses that arrives twice [1].
-    #[serde(default)]
     #[schemars(range(min = 0, max = 1))]
     pub duplicates: f64,
     /// Initial places of robots that do not start at their places in the formation.
-    #[serde(default)]
     pub start: Vec<RawStart>,
     /// Faults of single robots.
-    #[serde(default)]
     pub faults: Vec<RawFault>,
     /// Commands from outside on the way, by ascending period.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 200000))]
     pub commands: Vec<RawCommand>,
     /// Bounds on the results.
-    #[serde(default)]
     pub bounds: RawBounds,
     /// Every so many periods the robots' places are kept for tables and figures [period].
-    #[serde(default = "defaults::sweeps")]
     #[schemars(range(min = 1))]
     pub record_every: usize,
 }
@@ -198,31 +184,26 @@ pub enum RawCommandKind {
 /// Bounds on the results; a flight that breaks one of these ends with exit code 1. Errors are those of the robots
 /// without a fault at the time.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct RawBounds {
     /// Largest distance of a robot from where the leaders' affine motion has its place, ever [m].
-    #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub affine_error: Option<f64>,
-    /// The same at the end, or the distance from where the rule comes to rest if there is no affine motion [m].
-    #[serde(default)]
+    /// The same at the end, or the distance from where the rule comes to rest if there is no affine motion [m]. A flight
+    /// that ends before the leaders' programs does not keep it.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub final_error: Option<f64>,
     /// Smallest free space between two rims, or a rim and an obstacle, ever [m].
-    #[serde(default)]
     #[schemars(range(min = 0))]
     pub clearance: Option<f64>,
     /// Time after which the formation stays within `settled_within` of its shape, counted from the end of the
-    /// leaders' programs [s].
-    #[serde(default)]
+    /// leaders' programs [s], before which no flight keeps it.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub settling_time: Option<f64>,
     /// [m]
-    #[serde(default = "defaults::settling")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub settled_within: f64,
     /// Largest distance from the continuum run of the same scene, ever [m].
-    #[serde(default)]
     #[schemars(range(min = 0))]
     pub continuum_error: Option<f64>,
 }
@@ -234,7 +215,7 @@ impl Default for RawBounds {
             final_error: None,
             clearance: None,
             settling_time: None,
-            settled_within: defaults::settling(),
+            settled_within: 0.01,
             continuum_error: None,
         }
     }

@@ -160,23 +160,21 @@ pub struct RawBridge {
 
 /// The control loop.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct RawControl {
     /// Time between two targets [s].
-    #[serde(default = "defaults::period")]
     #[schemars(range(min = 0.002, max = 1.0))]
     pub period: f64,
     /// Applications of the rule in a period, fewer once the formation is at rest. With 1
     /// each robot uses its neighbours' poses once, as a robot on its own can; a central node may let the whole
     /// formation come to rest behind its leaders in every period [1].
-    #[serde(default = "defaults::sweeps")]
     #[schemars(range(min = 1, max = 100_000))]
     pub sweeps: usize,
 }
 
 impl Default for RawControl {
     fn default() -> Self {
-        Self { period: defaults::period(), sweeps: defaults::sweeps() }
+        Self { period: 0.05, sweeps: 1 }
     }
 }
 
@@ -187,64 +185,10 @@ pub(super) mod defaults {
     pub fn radius() -> f64 {
         0.15
     }
-    pub fn period() -> f64 {
-        0.05
-    }
-    pub fn sweeps() -> usize {
-        1
-    }
     pub fn ones() -> [f64; 2] {
         [1.0, 1.0]
     }
     pub fn one() -> f64 {
         1.0
-    }
-    pub fn age_limit() -> f64 {
-        0.5
-    }
-    pub fn stop_after() -> f64 {
-        2.0
-    }
-    pub fn range() -> f64 {
-        1e4
-    }
-    pub fn recover() -> usize {
-        5
-    }
-    pub fn reach() -> f64 {
-        10.0
-    }
-    pub fn range_tolerance() -> f64 {
-        0.5
-    }
-    pub fn max_faulty() -> usize {
-        1
-    }
-    pub fn frame_id() -> String {
-        "map".into()
-    }
-    pub fn pose_topic() -> String {
-        "{name}/pose".into()
-    }
-    pub fn target_topic() -> String {
-        "{name}/target_pose".into()
-    }
-    pub fn services() -> Vec<super::RawService> {
-        vec![super::RawService::Parameters, super::RawService::Lifecycle]
-    }
-    pub fn leader_topic() -> String {
-        "{name}/leader_pose".into()
-    }
-    pub fn ranges_topic() -> String {
-        "{name}/ranges".into()
-    }
-    pub fn emergency_stop_topic() -> String {
-        "~/emergency_stop_request".into()
-    }
-    pub fn velocity_topic() -> String {
-        "{name}/cmd_vel".into()
-    }
-    pub fn settling() -> f64 {
-        0.01
     }
 }

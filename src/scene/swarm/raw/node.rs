@@ -3,76 +3,63 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::defaults;
-
 /// Topics and messages of the node. `{name}` in a topic stands for the robot's name; a topic without a slash before it is
 /// below the fleet's namespace, which `--ros-args -r __ns:=/NAMESPACE` gives.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct RawNode {
     /// Frame of every pose (REP 105).
-    #[serde(default = "defaults::frame_id")]
     pub frame_id: String,
     /// Written before the frames that simulated robots carry, `{name}/base_link`; the fleet's namespace and a slash unless
     /// given, and nothing in the root.
-    #[serde(default)]
     pub frame_prefix: Option<String>,
     /// The message type of poses.
-    #[serde(default)]
     pub pose_type: RawPoseType,
     /// Topic of each robot's pose, or of the array of all.
-    #[serde(default = "defaults::pose_topic")]
     pub pose_topic: String,
+    /// Robots whose poses the node of one robot (`--member`) receives.
+    pub hears: RawHears,
     /// The message type of targets.
-    #[serde(default)]
     pub target_type: RawTargetType,
     /// Topic of each robot's target, or of the array of all.
-    #[serde(default = "defaults::target_topic")]
     pub target_topic: String,
     /// Topic of the next place of each leader with an `external` program, a `geometry_msgs/PoseStamped`.
-    #[serde(default = "defaults::leader_topic")]
     pub leader_topic: String,
     /// Topic of the ranges that each robot measures of others, a `flockform_msgs/Ranges`; needs `[ranges]`.
-    #[serde(default = "defaults::ranges_topic")]
     pub ranges_topic: String,
     /// Publishes velocities towards the targets too.
-    #[serde(default)]
     pub velocity: Option<RawVelocityType>,
     /// Topic of each robot's velocity.
-    #[serde(default = "defaults::velocity_topic")]
     pub velocity_topic: String,
     /// A `std_msgs/Empty` on this topic stops every robot, as the service `~/emergency_stop` does. A topic reaches the node that
     /// flies now, whatever a client's graph remembers of earlier ones.
-    #[serde(default = "defaults::emergency_stop_topic")]
     pub emergency_stop_topic: String,
     /// Publishes `visualization_msgs/MarkerArray` on `~/markers`; recordings have them in any case.
-    #[serde(default)]
     pub markers: bool,
     /// Services of the node beside its commands, and of the node of simulated robots. Each costs every peer of the network endpoints
     /// to discover.
-    #[serde(default = "defaults::services")]
     pub services: Vec<RawService>,
     /// Commands that the node accepts from the network.
-    #[serde(default)]
     pub commands: RawCommands,
 }
 
 impl Default for RawNode {
     fn default() -> Self {
         Self {
-            frame_id: defaults::frame_id(),
+            frame_id: "map".into(),
             frame_prefix: None,
             pose_type: RawPoseType::default(),
-            pose_topic: defaults::pose_topic(),
+            pose_topic: "{name}/pose".into(),
+            hears: RawHears::default(),
             target_type: RawTargetType::default(),
-            target_topic: defaults::target_topic(),
-            leader_topic: defaults::leader_topic(),
-            ranges_topic: defaults::ranges_topic(),
+            target_topic: "{name}/target_pose".into(),
+            leader_topic: "{name}/leader_pose".into(),
+            ranges_topic: "{name}/ranges".into(),
             velocity: None,
-            velocity_topic: defaults::velocity_topic(),
-            emergency_stop_topic: defaults::emergency_stop_topic(),
+            velocity_topic: "{name}/cmd_vel".into(),
+            emergency_stop_topic: "~/emergency_stop_request".into(),
             markers: false,
-            services: defaults::services(),
+            services: vec![RawService::Parameters, RawService::Lifecycle],
             commands: RawCommands::default(),
         }
     }
@@ -91,10 +78,11 @@ impl RawNode {
 
     /// Gives an array whose topic is not named in the file a name without a robot's in it.
     pub(in crate::scene::swarm) fn name_arrays(&mut self) {
-        if self.pose_type == RawPoseType::PoseArray && self.pose_topic == defaults::pose_topic() {
+        let unnamed = Self::default();
+        if self.pose_type == RawPoseType::PoseArray && self.pose_topic == unnamed.pose_topic {
             self.pose_topic = "poses".into();
         }
-        if self.has_target_array() && self.target_topic == defaults::target_topic() {
+        if self.has_target_array() && self.target_topic == unnamed.target_topic {
             self.target_topic = "target_poses".into();
         }
     }
@@ -164,6 +152,17 @@ pub enum RawPoseType {
     Odometry,
     /// One `geometry_msgs/PoseArray` for all, in the order of the robots, on `pose_topic`, which then is `poses` unless given.
     PoseArray,
+}
+
+/// Robots whose poses the node of one robot receives.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawHears {
+    /// All where `limits.clearance` is given, for any of them may come near; otherwise the neighbours.
+    #[default]
+    All,
+    /// The robots that its own follows: from others it keeps no distance.
+    Neighbours,
 }
 
 /// Message that carries targets.

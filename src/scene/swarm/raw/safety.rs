@@ -3,28 +3,22 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::defaults;
-
 /// Bounds on the published targets; a quantity without a bound is not limited.
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct RawLimits {
     /// [m/s]. It bounds how far a robot is from its last pose: without it no clearance is kept where poses are late or lost.
-    #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub speed: Option<f64>,
     /// [m/s^2]. Robots of the model double-integrator keep it always. The others put clearance, speed and fence first: where
     /// one comes upon another, or upon an obstacle, too fast, it is exceeded, and the report of a flight says how often.
-    #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub acceleration: Option<f64>,
     /// Free space kept between the rims of two robots, and of a robot and an obstacle [m]. Without it
     /// robots are not kept apart.
-    #[serde(default)]
     #[schemars(range(min = 0))]
     pub clearance: Option<f64>,
     /// Polygon that the robots stay inside, corners in order [m].
-    #[serde(default)]
     #[schemars(length(min = 3))]
     pub geofence: Option<Vec<[f64; 2]>>,
 }
@@ -52,69 +46,58 @@ pub enum RawObstacle {
 /// Conditions on poses. A robot whose pose grows old first counts at its last place. Then it
 /// is no longer used as a neighbour and gets no new target. Later it has to send several good poses to go on.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct RawPoses {
     /// Age up to which a pose is fresh [s]; three periods unless given.
-    #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub fresh: Option<f64>,
     /// Age up to which a pose is held [s].
-    #[serde(default = "defaults::age_limit")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub age_limit: f64,
     /// Age from which a robot is stopped [s].
-    #[serde(default = "defaults::stop_after")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub stop_after: f64,
     /// Poses farther from the formation's middle than this are rejected [m].
-    #[serde(default = "defaults::range")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub range: f64,
     /// No robot moves faster than this: a pose that implies more, by over half a metre of noise, is rejected
     /// [m/s]; the speed limit unless given.
-    #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub jump_speed: Option<f64>,
     /// Consecutive poses that agree, after which a robot's new place is accepted [1].
-    #[serde(default = "defaults::recover")]
     #[schemars(range(min = 1))]
     pub recover: usize,
 }
 
 impl Default for RawPoses {
     fn default() -> Self {
-        Self {
-            fresh: None,
-            age_limit: defaults::age_limit(),
-            stop_after: defaults::stop_after(),
-            range: defaults::range(),
-            jump_speed: None,
-            recover: defaults::recover(),
-        }
+        Self { fresh: None, age_limit: 0.5, stop_after: 2.0, range: 1e4, jump_speed: None, recover: 5 }
     }
 }
 
 /// Distances that robots measure of each other, by radio or sight. A robot whose poses are contradicted by more others than
 /// may lie is not believed. Needs a speed limit, or `poses.jump_speed`: robots move between a range and a pose.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct RawRanges {
     /// Simulated robots measure all that are no farther than this [m].
-    #[serde(default = "defaults::reach")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub reach: f64,
     /// Standard deviation of the ranges that simulated robots measure [m].
-    #[serde(default)]
     #[schemars(range(min = 0))]
     pub noise: f64,
     /// Difference between a range and the poses of the two that is no contradiction, besides the ways that they go in the
     /// meantime [m].
-    #[serde(default = "defaults::range_tolerance")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
     /// Most robots that lie, about their places or about ranges [1]: one more has to contradict a pose.
-    #[serde(default = "defaults::max_faulty")]
     pub max_faulty: usize,
+}
+
+impl Default for RawRanges {
+    fn default() -> Self {
+        Self { reach: 10.0, noise: 0.0, tolerance: 0.5, max_faulty: 1 }
+    }
 }
 
 /// W-MSR: each robot leaves the neighbours out that stray farthest from its own displacement.

@@ -1,16 +1,25 @@
-//! The charts of probed particles.
+//! Displacements and pseudo-energies of a few particles against the step.
 
-use super::super::figures::SERIES;
-use super::super::figures::chart::{Axis, Chart, Series, Style};
+use super::Subject;
+use super::chart::{Axis, Chart, Series, Style, draw_panels};
+use super::colour::SERIES;
 use crate::continuum::record::ProbeSeries;
 use crate::flock::body::Body;
 
 /// Probes in one chart: more lines than this cannot be distinguished.
 const MOST_LINES: usize = SERIES.len();
 
-/// Displacements and PE1 of the probed particles against the step; a chart in which nothing happens is left
-/// out.
+/// The charts of probed particles on one sheet.
+pub fn probes(subject: &Subject<'_>, probes: &[ProbeSeries]) -> String {
+    draw_panels(subject.title, &charts(probes, subject.body, subject.unit))
+}
+
+/// Displacements and pseudo-energies of the probed particles against the step; a chart in which nothing happens is left
+/// out, unless nothing happens in any.
 pub fn charts(probes: &[ProbeSeries], body: &Body, unit: &str) -> Vec<Chart> {
+    if probes.is_empty() {
+        return Vec::new();
+    }
     let (shown, reference) = (&probes[..probes.len().min(MOST_LINES)], &body.reference);
     let mut note = "probed particles, by id".to_owned();
     if shown.len() < probes.len() {
@@ -35,8 +44,11 @@ pub fn charts(probes: &[ProbeSeries], body: &Body, unit: &str) -> Vec<Chart> {
         Chart { follows_clock: true, ..Chart::new(quantity, note.clone(), axes, series) }
     };
     let happens = |chart: &Chart| {
-        let sizes = chart.series.iter().flat_map(|series| &series.points).map(|point| point[1].abs());
-        sizes.fold(0.0, f64::max) > 0.0
+        // Less is rounding.
+        let length = 1e-10 * body.lattice.spacing();
+        let least = if chart.y.unit == squared { length * length } else { length };
+        chart.series.iter().flat_map(|series| &series.points).any(|point| point[1].abs() > least)
     };
-    quantities.into_iter().map(chart).filter(happens).collect()
+    let (happening, still): (Vec<_>, Vec<_>) = quantities.into_iter().map(chart).partition(happens);
+    if happening.is_empty() { still } else { happening }
 }
