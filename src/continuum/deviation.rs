@@ -5,8 +5,8 @@ use crate::flock::vectors::distance;
 use crate::geometry::locate::Finder;
 use crate::geometry::outline::Outline;
 use crate::geometry::piece::Piece;
+use crate::geometry::point::area;
 use crate::material::cells::Cells;
-use crate::material::stiffness::area;
 
 /// Distances from sides to pieces that are computed at most: beyond, some of the sides stand for all.
 const MOST_DISTANCES: usize = 10_000_000;

@@ -14,11 +14,11 @@ use crate::engine::Engine;
 use crate::flock::body::Body;
 use crate::flock::rules::Rotation;
 use crate::flock::vectors::{Vectors, distance};
+use crate::geometry::point::area;
 use crate::material::cells::{Cells, Incidence};
 use crate::material::elastic::Elastic;
 use crate::material::free_edge::Edge;
 use crate::material::recovery::{CellStress, FEWEST_CELLS, Fields, KnownTraction, REACH, stress_at};
-use crate::material::stiffness::area;
 use crate::material::stress::{self, StressState};
 
 /// Steps of a line of sight \[spacings\].

@@ -1,9 +1,10 @@
 //! The curves that a mesh has to follow: the pieces of an outline and lines inside the body, cut where they meet
 //! and where something begins or ends.
 
+use crate::geometry::meeting::{crossings, on};
 use crate::geometry::outline::{Outline, Place};
-use crate::geometry::piece::Piece;
-use crate::geometry::point::{Point, distance, minus};
+use crate::geometry::piece::{Arc, Piece};
+use crate::geometry::point::{Point, distance};
 
 /// Points nearer than this part of the body's size are one.
 pub(crate) const MERGED: f64 = 1e-6;
@@ -203,53 +204,18 @@ fn of_corner(before: &Piece, after: &Piece) -> f64 {
     if turn < -0.35 { 0.75 } else { 0.0 }
 }
 
-/// The meetings of two curves, as places along each.
+/// Where two curves cross, or touch but for `near`, as places along each.
 fn meetings(a: &Piece, b: &Piece, near: f64) -> Vec<[f64; 2]> {
-    let mut places: Vec<[f64; 2]> = Vec::new();
-    let crossings = match (&a.arc, &b.arc) {
-        (None, None) => line_line(a, b),
-        (None, Some(arc)) => line_circle(a, arc.centre, arc.radius),
-        (Some(arc), None) => line_circle(b, arc.centre, arc.radius),
-        (Some(one), Some(other)) => circle_circle((one.centre, one.radius), (other.centre, other.radius)),
-    };
-    for p in crossings.into_iter().chain([a.from, a.to, b.from, b.to]) {
-        let (t, s) = (a.nearest(p), b.nearest(p));
-        if distance(a.point(t), p) <= near && distance(b.point(s), p) <= near {
-            places.push([t, s]);
-        }
+    let mut found = crossings(a, b, near);
+    if found.is_empty() {
+        // What touches an arc does so where it is nearest to its centre.
+        let touch = |(piece, arc): (&Piece, Option<Arc>)| {
+            let p = piece.point(piece.nearest(arc?.centre));
+            Some([on(a, p, near)?, on(b, p, near)?])
+        };
+        found.extend([(a, b.arc), (b, a.arc)].into_iter().filter_map(touch));
     }
-    places
-}
-
-fn line_line(a: &Piece, b: &Piece) -> Vec<Point> {
-    let (u, v, off) = (minus(a.to, a.from), minus(b.to, b.from), minus(b.from, a.from));
-    let turn = u[0] * v[1] - u[1] * v[0];
-    if turn == 0.0 {
-        return Vec::new();
-    }
-    let t = (off[0] * v[1] - off[1] * v[0]) / turn;
-    vec![[a.from[0] + t * u[0], a.from[1] + t * u[1]]]
-}
-
-fn line_circle(line: &Piece, centre: Point, radius: f64) -> Vec<Point> {
-    let (u, off) = (line.tangent(0.0), minus(line.from, centre));
-    let along = -(u[0] * off[0] + u[1] * off[1]);
-    let foot = [line.from[0] + along * u[0], line.from[1] + along * u[1]];
-    let rest = radius * radius - (foot[0] - centre[0]).powi(2) - (foot[1] - centre[1]).powi(2);
-    let half = rest.max(0.0).sqrt();
-    [-half, half].map(|s| [foot[0] + s * u[0], foot[1] + s * u[1]]).to_vec()
-}
-
-fn circle_circle((c, r): (Point, f64), (d, s): (Point, f64)) -> Vec<Point> {
-    let off = minus(d, c);
-    let apart = off[0].hypot(off[1]);
-    if apart == 0.0 {
-        return Vec::new();
-    }
-    let along = (apart * apart + r * r - s * s) / (2.0 * apart);
-    let half = (r * r - along * along).max(0.0).sqrt();
-    let u = off.map(|v| v / apart);
-    [-half, half].map(|h| [c[0] + along * u[0] - h * u[1], c[1] + along * u[1] + h * u[0]]).to_vec()
+    found
 }
 
 #[cfg(test)]
@@ -300,5 +266,25 @@ mod tests {
         let curves = Curves::new(&plate(), &[], &[], &points);
         assert_eq!((curves.junctions.len(), curves.spans.len()), (4 + 1 + 2, 6));
         assert_eq!(curves.junctions.iter().filter(|j| j.grading == 0.5).count(), 3);
+    }
+
+    #[test]
+    fn what_touches_an_arc_but_for_a_gap_below_near_meets_it_there_and_what_is_farther_does_not() {
+        let circle = |x: f64, radius: f64| Piece::arc([x, 0.0], radius, 1.0, std::f64::consts::TAU);
+        let beside = |gap: f64| {
+            let edge = Piece::edge([1.0 + gap, -1.0], [1.0 + gap, 2.0]);
+            [circle(3.0 + gap, 2.0), circle(0.5 - gap, 0.5), edge]
+        };
+        let one = circle(0.0, 1.0);
+        for other in [0.0, 1e-9].into_iter().flat_map(beside) {
+            for (a, b) in [(&one, &other), (&other, &one)] {
+                let places = meetings(a, b, 1e-8);
+                let is_there = |[s, t]: &[f64; 2]| {
+                    [a.point(*s), b.point(*t)].iter().all(|p| distance(*p, [1.0, 0.0]) <= 2e-8)
+                };
+                assert!(!places.is_empty() && places.iter().all(is_there), "{a:?} {b:?}: {places:?}");
+            }
+        }
+        assert!(beside(1e-7).iter().all(|other| meetings(&one, other, 1e-8).is_empty()));
     }
 }

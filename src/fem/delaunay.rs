@@ -13,7 +13,7 @@ use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, PositionInTri
 use super::curves::Curves;
 use super::error::FemError;
 use super::size::{GROWTH, Sizes};
-use crate::geometry::point::{Point, distance};
+use crate::geometry::point::{Point, area, distance};
 
 /// Radius of the circumscribed circle over the size asked for, above which a triangle is too large.
 const LARGE: f64 = 0.75;
@@ -214,7 +214,7 @@ impl Mesher<'_> {
         let at = corners.map(|v| v.at);
         let sides = [0, 1, 2].map(|k| distance(at[k], at[(k + 1) % 3]));
         let (centre, radius) = circle(at);
-        let twice_area = 2.0 * area(at);
+        let twice_area = 2.0 * area(&at);
         for (k, side) in sides.into_iter().enumerate() {
             let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
             if let Some((ends, stretch)) = self.stretch(a, b)
@@ -365,10 +365,6 @@ fn is_sharp(curves: &Curves, p: usize, q: usize) -> bool {
         sharp |= distance(at_a, at_b) < 1e-6 * curves.size && u[0] * v[0] + u[1] * v[1] > 0.5;
     }
     sharp
-}
-
-fn area(p: [Point; 3]) -> f64 {
-    0.5 * ((p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (p[1][1] - p[0][1]) * (p[2][0] - p[0][0]))
 }
 
 /// Centre and radius of the circumscribed circle.

@@ -82,46 +82,31 @@ pub enum FemError {
         second: f64,
     },
     /// Too few prescribed displacements: a part can move as a rigid body.
-    #[error("the part that contains node {node} is not held: it is free to {motion}")]
+    #[error("the part of the body around ({:.6}, {:.6}) is not held and free to {motion}", .at[0], .at[1])]
     Mechanism {
         /// The lowest-numbered node of the part.
         node: usize,
+        /// Where it lies \[m\].
+        at: [f64; 2],
         /// "translate along x", "translate along y" or "rotate".
         motion: &'static str,
     },
     /// The stiffness matrix is singular to working precision though every part is held against
     /// rigid motion: usually parts that hang together by a single node, as by a hinge.
     #[error(
-        "the stiffness matrix is singular to working precision; \
-         the softest motion is largest at node {node}"
+        "the body is soft beyond what a double resolves, most of all near ({:.6}, {:.6})", .at[0], .at[1]
     )]
     Singular {
         /// The node that moves most in the softest motion.
         node: usize,
+        /// Where it lies \[m\].
+        at: [f64; 2],
     },
     /// A support of a shape that lies beside the body.
     #[error("support {index} holds no point of the body")]
     EmptySupport {
         /// Place in the list of supports, from 0.
         index: usize,
-    },
-    /// Too few supports: the part of a shape around a place can move as a rigid body.
-    #[error("the part of the body around ({x}, {y}) is not held: it is free to {motion}")]
-    Unheld {
-        /// Abscissa \[m\].
-        x: f64,
-        /// Ordinate \[m\].
-        y: f64,
-        /// "translate along x", "translate along y" or "rotate".
-        motion: &'static str,
-    },
-    /// A shape that is soft beyond what a double resolves.
-    #[error("the body is soft beyond what a double resolves, most of all near ({x}, {y})")]
-    Soft {
-        /// Abscissa \[m\].
-        x: f64,
-        /// Ordinate \[m\].
-        y: f64,
     },
     /// A body that turns has no equilibrium, or none that is found on the way, beyond a part of its loads and motions.
     #[error(

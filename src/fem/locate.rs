@@ -1,7 +1,8 @@
-//! Which cell holds a point, and where in it: bins over the bounding box, then Newton's method on the
-//! isoparametric map, both bounded.
+//! Which cell holds a point, and where in it: the boxes of cells, then a bounded Newton's method on the isoparametric map.
 
 use super::mesh::Mesh;
+use crate::geometry::box_tree::BoxTree;
+use crate::geometry::point::{bounds, distance};
 
 /// Newton steps at most; a point of the cell is reached in fewer than ten.
 const STEPS: usize = 20;
@@ -11,76 +12,42 @@ const SLACK: f64 = 1e-8;
 /// A search structure over the cells of one mesh.
 pub(crate) struct Locator<'m> {
     mesh: &'m Mesh,
-    low: [f64; 2],
-    width: f64,
-    bins: [usize; 2],
-    starts: Vec<usize>,
-    cells: Vec<u32>,
+    boxes: BoxTree,
 }
 
 impl<'m> Locator<'m> {
-    /// About as many square bins as there are cells.
     pub fn new(mesh: &'m Mesh) -> Locator<'m> {
-        let (low, high) = bounds(mesh.x().iter().copied().zip(mesh.y().iter().copied()));
-        let size = [high[0] - low[0], high[1] - low[1]];
-        // A very slender body gets fewer bins than cells: at most 10 000 along its length.
-        let width = (size[0] * size[1] / mesh.cell_count() as f64).sqrt().max(size[0].max(size[1]) / 1e4);
-        let bins = size.map(|s| (s / width) as usize + 1);
-        let mut locator = Locator { mesh, low, width, bins, starts: Vec::new(), cells: Vec::new() };
-        let mut entries = Vec::new();
-        for cell in 0..mesh.cell_count() {
-            let at = mesh.positions(cell);
-            let (a, b) = bounds(at[..mesh.kind().nodes()].iter().map(|p| (p[0], p[1])));
+        let of_cell = |cell: usize| {
+            let (low, high) = bounds(mesh.positions(cell)[..mesh.kind().nodes()].iter().copied());
             // A curved side may bulge beyond its nodes by less than an eighth of the cell.
-            let margin = 0.125 * (mesh.kind().degree() - 1) as f64 * (b[0] - a[0]).max(b[1] - a[1]);
-            let first = locator.bin([a[0] - margin, a[1] - margin]);
-            let last = locator.bin([b[0] + margin, b[1] + margin]);
-            for j in first[1]..=last[1] {
-                entries.extend((first[0]..=last[0]).map(|i| (j * bins[0] + i, cell as u32)));
-            }
-        }
-        entries.sort_unstable();
-        locator.starts = (0..=bins[0] * bins[1]).map(|b| entries.partition_point(|e| e.0 < b)).collect();
-        locator.cells = entries.into_iter().map(|e| e.1).collect();
-        locator
-    }
-
-    /// The bin of a point, clamped to the box.
-    fn bin(&self, p: [f64; 2]) -> [usize; 2] {
-        [0, 1].map(|i| (((p[i] - self.low[i]) / self.width).max(0.0) as usize).min(self.bins[i] - 1))
+            let bulge = 0.125 * (mesh.kind().degree() - 1) as f64 + 4.0 * SLACK;
+            let margin = bulge * (high[0] - low[0]).max(high[1] - low[1]);
+            (low.map(|v| v - margin), high.map(|v| v + margin))
+        };
+        Locator { mesh, boxes: BoxTree::new((0..mesh.cell_count()).map(of_cell)) }
     }
 
     /// The lowest-numbered cell that holds `p` \[m\], with the reference coordinates there.
     pub fn find(&self, p: [f64; 2]) -> Option<(usize, [f64; 2])> {
-        let [i, j] = self.bin(p);
-        let bin = j * self.bins[0] + i;
-        let cells = &self.cells[self.starts[bin]..self.starts[bin + 1]];
-        cells.iter().find_map(|&cell| {
-            let place = invert(self.mesh, cell as usize, p)?;
-            self.mesh.kind().contains(place, SLACK).then_some((cell as usize, place))
-        })
+        let place =
+            |cell| invert(self.mesh, cell, p).filter(|&place| self.mesh.kind().contains(place, SLACK));
+        let holding = self.boxes.overlapping(p, p).filter_map(|cell| Some((cell, place(cell)?)));
+        holding.min_by_key(|&(cell, _)| cell)
     }
 
     /// The cell nearest to a point that is in none, with reference coordinates that continue it to the point; `None`
-    /// if it is further away than `reach` \[m\].
+    /// if it is further away than `reach` \[m\]. Of cells equally far it is the lowest-numbered one.
     pub fn nearest(&self, p: [f64; 2], reach: f64) -> Option<(usize, [f64; 2])> {
         let kind = self.mesh.kind();
-        let (first, last) = (self.bin(p.map(|v| v - reach)), self.bin(p.map(|v| v + reach)));
-        let mut best: Option<(f64, usize, [f64; 2])> = None;
-        for j in first[1]..=last[1] {
-            for bin in (first[0]..=last[0]).map(|i| j * self.bins[0] + i) {
-                for &cell in &self.cells[self.starts[bin]..self.starts[bin + 1]] {
-                    let Some(place) = invert(self.mesh, cell as usize, p) else { continue };
-                    let at = self.mesh.positions(cell as usize);
-                    let within = kind.shape(kind.clamped(place)).interpolate(&at[..kind.nodes()]);
-                    let apart = (p[0] - within[0]).hypot(p[1] - within[1]);
-                    if apart <= reach && best.is_none_or(|(least, ..)| apart < least) {
-                        best = Some((apart, cell as usize, place));
-                    }
-                }
-            }
-        }
-        best.map(|(_, cell, place)| (cell, place))
+        let near = self.boxes.overlapping(p.map(|v| v - reach), p.map(|v| v + reach)).filter_map(|cell| {
+            let place = invert(self.mesh, cell, p)?;
+            let within =
+                kind.shape(kind.clamped(place)).interpolate(&self.mesh.positions(cell)[..kind.nodes()]);
+            let apart = distance(p, within);
+            (apart <= reach).then_some((apart, cell, place))
+        });
+        let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        nearest.map(|(_, cell, place)| (cell, place))
     }
 }
 
@@ -105,12 +72,6 @@ pub(crate) fn invert(mesh: &Mesh, cell: usize, p: [f64; 2]) -> Option<[f64; 2]> 
         }
     }
     None
-}
-
-fn bounds(points: impl Iterator<Item = (f64, f64)>) -> ([f64; 2], [f64; 2]) {
-    points.fold(([f64::MAX; 2], [f64::MIN; 2]), |(l, h), (x, y)| {
-        ([l[0].min(x), l[1].min(y)], [h[0].max(x), h[1].max(y)])
-    })
 }
 
 #[cfg(test)]

@@ -110,7 +110,7 @@ impl Way<'_> {
     }
 
     fn moved(&self, system: &System, steps: &[Option<f64>]) -> Result<Vec<f64>, FemError> {
-        let found = solve_tangent(system)?;
+        let found = solve_tangent(system, &self.problem.mesh)?;
         Ok((0..steps.len())
             .map(|c| system.unknown[c].map_or_else(|| steps[c].unwrap_or(0.0), |i| found[i]))
             .collect())

@@ -81,7 +81,7 @@ pub struct ShapeSolution {
 /// # Errors
 /// Errors that keep the shape from being meshed ([`FemError::Unmeshable`], [`FemError::InvertedCell`]); a support
 /// without a node ([`FemError::EmptySupport`]), a point outside ([`FemError::OutsideMesh`]); a body that is not
-/// held ([`FemError::Unheld`], [`FemError::Soft`]) or, if it turns, has no equilibrium ([`FemError::Lost`]); input that is
+/// held ([`FemError::Mechanism`], [`FemError::Singular`]) or, if it turns, has no equilibrium ([`FemError::Lost`]); input that is
 /// not finite; memory.
 pub fn solve_shape(problem: &ShapeProblem<'_>, effort: &Effort) -> Result<ShapeSolution, FemError> {
     match refine(problem, effort, true) {
@@ -117,7 +117,7 @@ fn refine(problem: &ShapeProblem<'_>, effort: &Effort, is_graded: bool) -> Resul
             }
             (found, coarser) => {
                 last = coarser;
-                found.map_err(|error| at_place(error, &mesh))?
+                found?
             }
         };
         let change = last.as_ref().map_or(0.0, |(coarse, _)| change(coarse, &solution));
@@ -133,22 +133,6 @@ fn refine(problem: &ShapeProblem<'_>, effort: &Effort, is_graded: bool) -> Resul
         }
         mesh = mesh.refined()?;
         last = Some((solution, reactions));
-    }
-}
-
-/// Names the place instead of the node, which means nothing outside.
-fn at_place(error: FemError, mesh: &OutlineMesh) -> FemError {
-    let at = |node: usize| (mesh.mesh().x()[node], mesh.mesh().y()[node]);
-    match error {
-        FemError::Mechanism { node, motion } => {
-            let (x, y) = at(node);
-            FemError::Unheld { x, y, motion }
-        }
-        FemError::Singular { node } => {
-            let (x, y) = at(node);
-            FemError::Soft { x, y }
-        }
-        other => other,
     }
 }
 

@@ -47,7 +47,7 @@ pub(crate) fn solve_near(problem: &Problem, start: Option<Vec<f64>>) -> Result<S
         return solve_turning(problem, &prescribed, start);
     }
     let system = assemble(problem, &prescribed);
-    let unknowns = if system.load.is_empty() { Vec::new() } else { solve_reduced(&system)? };
+    let unknowns = if system.load.is_empty() { Vec::new() } else { solve_reduced(&system, &problem.mesh)? };
     let component = |c: usize| match system.unknown[c] {
         Some(i) => unknowns[i],
         None => prescribed[c].unwrap_or(0.0),
@@ -84,7 +84,7 @@ fn check_rigid_motion(mesh: &Mesh, prescribed: &[Option<f64>]) -> Result<(), Fem
         } else {
             continue;
         };
-        return Err(FemError::Mechanism { node, motion });
+        return Err(FemError::Mechanism { node, at: place(mesh, node), motion });
     }
     Ok(())
 }
@@ -107,9 +107,9 @@ struct Factor {
     is_definite: bool,
 }
 
-fn solve_reduced(system: &System) -> Result<Vec<f64>, FemError> {
-    let mut factor = factorise(system, true)?;
-    check_softest_motion(system, &mut factor)?;
+fn solve_reduced(system: &System, mesh: &Mesh) -> Result<Vec<f64>, FemError> {
+    let mut factor = factorise(system, mesh, true)?;
+    check_softest_motion(system, mesh, &mut factor)?;
     let mut u = system.load.clone();
     factor.solve(&mut u);
     Ok(u)
@@ -117,16 +117,16 @@ fn solve_reduced(system: &System) -> Result<Vec<f64>, FemError> {
 
 /// The same for a tangent that need not be positive definite: where a clamp ends, the stress of a fine mesh passes what
 /// any material bears, and a few cells there give way.
-pub(crate) fn solve_tangent(system: &System) -> Result<Vec<f64>, FemError> {
+pub(crate) fn solve_tangent(system: &System, mesh: &Mesh) -> Result<Vec<f64>, FemError> {
     let mut u = system.load.clone();
     if !u.is_empty() {
-        factorise(system, false)?.solve(&mut u);
+        factorise(system, mesh, false)?.solve(&mut u);
     }
     Ok(u)
 }
 
 /// L L' of a positive definite matrix, else L D L' without pivots.
-fn factorise(system: &System, is_definite: bool) -> Result<Factor, FemError> {
+fn factorise(system: &System, mesh: &Mesh, is_definite: bool) -> Result<Factor, FemError> {
     let n = system.load.len();
     let failed = |e: &dyn std::fmt::Debug| FemError::Factorisation { unknowns: n, reason: format!("{e:?}") };
     let pattern = SymbolicSparseColMatRef::new_checked(n, n, &system.starts, None, &system.rows);
@@ -172,7 +172,7 @@ fn factorise(system: &System, is_definite: bool) -> Result<Factor, FemError> {
     };
     if let Some(index) = at {
         let unknown = symbolic.perm().map_or(index, |p| p.arrays().0[index]);
-        return Err(FemError::Singular { node: node_of(system, unknown) });
+        return Err(singular(system, mesh, unknown));
     }
     Ok(Factor { symbolic, values, memory, is_definite })
 }
@@ -192,7 +192,7 @@ impl Factor {
 
 /// Two steps of inverse iteration on K z = lambda diag(K) z; lambda from the Rayleigh quotient. A hinge
 /// leaves lambda at rounding level even where every pivot of the factorisation came out positive.
-fn check_softest_motion(system: &System, factor: &mut Factor) -> Result<(), FemError> {
+fn check_softest_motion(system: &System, mesh: &Mesh, factor: &mut Factor) -> Result<(), FemError> {
     let diagonal: Vec<f64> = system.starts[..system.load.len()].iter().map(|&d| system.values[d]).collect();
     // A fixed start without symmetry: the fractional parts of multiples of the golden ratio.
     let mut z: Vec<f64> =
@@ -210,11 +210,17 @@ fn check_softest_motion(system: &System, factor: &mut Factor) -> Result<(), FemE
         return Ok(());
     }
     let most = (0..z.len()).fold(0, |best, i| if z[i].abs() > z[best].abs() { i } else { best });
-    Err(FemError::Singular { node: node_of(system, most) })
+    Err(singular(system, mesh, most))
 }
 
-fn node_of(system: &System, unknown: usize) -> usize {
-    system.unknown.iter().position(|&u| u == Some(unknown)).map_or(0, |component| component / 2)
+/// The refusal of a body that is softest in this unknown.
+fn singular(system: &System, mesh: &Mesh, unknown: usize) -> FemError {
+    let node = system.unknown.iter().position(|&u| u == Some(unknown)).map_or(0, |component| component / 2);
+    FemError::Singular { node, at: place(mesh, node) }
+}
+
+fn place(mesh: &Mesh, node: usize) -> [f64; 2] {
+    [mesh.x()[node], mesh.y()[node]]
 }
 
 #[cfg(test)]
@@ -232,7 +238,7 @@ mod tests {
 
     fn motion(problem: &Problem) -> &'static str {
         match solve(problem) {
-            Err(FemError::Mechanism { node: 0, motion }) => motion,
+            Err(FemError::Mechanism { node: 0, at: [0.0, 0.0], motion }) => motion,
             other => panic!("{other:?}"),
         }
     }
@@ -270,7 +276,8 @@ mod tests {
             let mut problem = hinged(kind);
             let refused = solve(&problem);
             assert!(
-                matches!(refused, Err(FemError::Singular { node }) if problem.mesh.x()[node] >= 0.0),
+                matches!(refused, Err(FemError::Singular { node, at })
+                    if at[0] >= 0.0 && at == place(&problem.mesh, node)),
                 "{refused:?}"
             );
             problem.fix(&[4], Axis::Y, 0.0);

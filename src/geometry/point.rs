@@ -27,6 +27,15 @@ pub fn cross(a: Point, b: Point) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
 
+/// Area of a polygon, positive if its corners run counter-clockwise.
+pub fn area<'a>(corners: impl IntoIterator<Item = &'a Point, IntoIter: Clone>) -> f64 {
+    let corners = corners.into_iter();
+    // About the first corner: far from the origin of the coordinates no digits are lost.
+    let o = corners.clone().next().copied().unwrap_or_default();
+    let off = corners.map(|&p| minus(p, o));
+    off.clone().zip(off.skip(1)).map(|(a, b)| 0.5 * cross(a, b)).sum()
+}
+
 /// Euclidean distance; `hypot`, so that coordinates near 1e±150 neither overflow nor vanish.
 #[inline]
 pub fn distance(a: Point, b: Point) -> f64 {

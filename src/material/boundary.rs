@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use super::cells::Cells;
-use super::stiffness::area;
 use crate::flock::vectors::Vectors;
 use crate::geometry::Point;
 use crate::geometry::outline::{Outline, OutlineError};
+use crate::geometry::point::area;
 
 /// Sides in the order of their cells, the body to the left of each. Those of a body of which each rank has a part are the same for
 /// all of them.
@@ -44,7 +44,7 @@ impl Boundary {
         };
         let mut polygons: Vec<Vec<Point>> = ways(self.ends.iter().copied()).iter().map(straight).collect();
         // The outer one is the largest, which bounds all others.
-        let size = |polygon: &Vec<Point>| if polygon.len() < 3 { 0.0 } else { area(polygon).abs() };
+        let size = |polygon: &Vec<Point>| area(polygon).abs();
         let outer = (0..polygons.len()).max_by(|&a, &b| size(&polygons[a]).total_cmp(&size(&polygons[b])));
         if polygons.is_empty() {
             return Err(OutlineError::NoArea { ring: 0, place: [0.0; 2] });

@@ -22,8 +22,8 @@
 
 use super::cells::{Cells, Incidence};
 use super::elastic::Elastic;
-use super::stiffness::area;
 use super::stress::Over;
+use crate::geometry::point::area;
 
 /// Which cells are averaged together.
 #[derive(Clone, Debug)]

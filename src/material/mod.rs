@@ -28,8 +28,7 @@
 //! * [`dilatation`]: near nu = 1/2, the mean over the cells around a particle in place of each cell's own.
 //! * [`mechanism`]: whether the cells hold the body together, or a hinge lets it fold.
 //! * [`weights`]: cells and neighbours to `K_ij`, `D_i` and `W_ij`, kept by class of particles.
-//! * [`outline_loads`]: what acts on the outline, on particles or on all of the body to the forces `f_i`; [`loads`]: the
-//!   same for tractions given side by side.
+//! * [`outline_loads`]: what acts on the outline, on particles or on all of the body to the forces `f_i`.
 //! * [`homogenise`]: the way back, from the weights of an interior particle, matrices or scalars, to
 //!   the material that they are.
 //! * [`place`]: any place of a body, from the particles around it.
@@ -65,7 +64,6 @@ pub mod fit;
 pub mod free_edge;
 pub mod gradient;
 pub mod homogenise;
-pub mod loads;
 pub mod mechanism;
 pub mod outline_loads;
 pub mod place;

@@ -5,13 +5,13 @@
 //! body that is fitted to its outline the sides are the outline, and the forces do the same work as the load in every
 //! displacement that the cells can have; on a body of whole cells they replace the load by an equivalent one.
 
-use std::collections::HashMap;
-
 use super::boundary::Boundary;
 use super::cells::Cells;
 use crate::flock::body::Body;
 use crate::flock::vectors::Vectors;
+use crate::geometry::box_tree::BoxTree;
 use crate::geometry::outline::{Outline, Place};
+use crate::geometry::point::bounds;
 use crate::geometry::portion::Portion;
 use crate::geometry::shape::segment_distance;
 
@@ -158,7 +158,9 @@ pub struct Loader<'a> {
     body: &'a Body,
     /// The outline of the body's shape; only loads on it need one.
     outline: Option<&'a Outline>,
-    sides: SideGrid<'a>,
+    boundary: &'a Boundary,
+    /// The boxes of its sides.
+    sides: BoxTree,
 }
 
 impl<'a> Loader<'a> {
@@ -169,7 +171,8 @@ impl<'a> Loader<'a> {
         body: &'a Body,
         (outline, boundary): (Option<&'a Outline>, &'a Boundary),
     ) -> Self {
-        Self { cells, body, outline, sides: SideGrid::new(boundary, body.lattice.spacing()) }
+        let sides = BoxTree::new(boundary.places.iter().map(|&ends| bounds(ends)));
+        Self { cells, body, outline, boundary, sides }
     }
 
     /// Adds the forces of a load to those on the particles \[force\], shape \[count\].
@@ -210,7 +213,11 @@ impl<'a> Loader<'a> {
             None => (Vec::new(), 0.25 * spacing),
         };
         for (point, force) in load.forces(outline, &breaks, grain) {
-            let side = self.sides.nearest(point).ok_or(LoadError::NoBoundary)?;
+            let apart = |side: usize| {
+                let [from, to] = self.boundary.places[side];
+                segment_distance(point, from, to)
+            };
+            let (side, _) = self.sides.nearest(point, apart).ok_or(LoadError::NoBoundary)?;
             self.attach(point, force, side, forces);
         }
         Ok(())
@@ -219,7 +226,7 @@ impl<'a> Loader<'a> {
     /// Replaces a force at a point \[length\] by forces on the ends of a side: shares of it where the point's foot is on
     /// the side, and a couple across the side for what that leaves of the moment. Of a part, those that it has as in the whole.
     fn attach(&self, point: [f64; 2], force: [f64; 2], side: usize, forces: &mut Vectors) {
-        let Boundary { ends, places } = self.sides.boundary;
+        let Boundary { ends, places } = self.boundary;
         let ([a, b], [from, to]) = (ends[side], places[side]);
         let mut push = |index: usize, force: [f64; 2]| {
             if let Some(particle) = self.body.exact_particle(index) {
@@ -255,70 +262,17 @@ fn push(forces: &mut Vectors, particle: u32, [x, y]: [f64; 2]) {
     forces.y[particle as usize] += y;
 }
 
-/// Sides of the cells' boundary in square buckets.
-#[derive(Debug)]
-struct SideGrid<'a> {
-    /// \[length\]
-    bucket: f64,
-    boundary: &'a Boundary,
-    buckets: HashMap<[i64; 2], Vec<u32>>,
-}
-
-impl<'a> SideGrid<'a> {
-    fn new(boundary: &'a Boundary, bucket: f64) -> Self {
-        let mut grid = Self { bucket, boundary, buckets: HashMap::new() };
-        for (number, &[a, b]) in boundary.places.iter().enumerate() {
-            let low = grid.key([0, 1].map(|k| a[k].min(b[k])));
-            let high = grid.key([0, 1].map(|k| a[k].max(b[k])));
-            for key in (low[0]..=high[0]).flat_map(|i| (low[1]..=high[1]).map(move |j| [i, j])) {
-                grid.buckets.entry(key).or_default().push(number as u32);
-            }
-        }
-        grid
-    }
-
-    fn key(&self, p: [f64; 2]) -> [i64; 2] {
-        p.map(|v| (v / self.bucket).floor() as i64)
-    }
-
-    /// The number of the side nearest to a point \[length\].
-    fn nearest(&self, p: [f64; 2]) -> Option<usize> {
-        let [i, j] = self.key(p);
-        let mut best: Option<(f64, u32)> = None;
-        // Ring by ring: what is in a farther ring is farther than what a nearer one has.
-        for reach in 0..MOST_RINGS {
-            if best.is_some_and(|(near, _)| near <= (reach - 1).max(0) as f64 * self.bucket) {
-                break;
-            }
-            let ring = (-reach..=reach).flat_map(|di| (-reach..=reach).map(move |dj| [di, dj]));
-            for [di, dj] in ring.filter(|[di, dj]| di.abs().max(dj.abs()) == reach) {
-                for &number in self.buckets.get(&[i + di, j + dj]).into_iter().flatten() {
-                    let [a, b] = self.boundary.places[number as usize];
-                    let apart = segment_distance(p, a, b);
-                    if best.is_none_or(|(near, known)| (apart, number) < (near, known)) {
-                        best = Some((apart, number));
-                    }
-                }
-            }
-        }
-        best.map(|(_, number)| number as usize)
-    }
-}
-
-/// Rings of buckets searched: the boundary of the cells is never farther from the outline than that.
-const MOST_RINGS: i64 = 64;
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::flock::body::Cut;
     use crate::flock::lattice::{Lattice, LatticeKind};
     use crate::flock::outlay::Outlay;
+    use crate::geometry::point::area;
     use crate::geometry::portion::Selection;
     use crate::geometry::shape::Shape;
     use crate::material::cells::{neighbourhood, templates};
     use crate::material::fit::fit;
-    use crate::material::stiffness::area;
 
     fn shape() -> Shape {
         Shape::WithHoles {

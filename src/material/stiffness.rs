@@ -19,6 +19,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use nalgebra::{DMatrix, DVector, Matrix2, SMatrix, Vector2, Vector3};
 
 use super::elastic::{Elastic, Voigt};
+use crate::geometry::point::area;
 
 /// Why a polygon is no cell.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -151,11 +152,6 @@ fn cut_stabilisation(corners: &[[f64; 2]], stiffness: &Voigt) -> DMatrix<f64> {
     }
     let rest = DMatrix::identity(count, count) - affine_projection(corners);
     (rest.transpose() * rest).kronecker(&bending_tensor(corners, bending_modulus(stiffness)))
-}
-
-/// Area of a polygon \[length^2\], positive if its corners run counter-clockwise.
-pub fn area(corners: &[[f64; 2]]) -> f64 {
-    (1..corners.len() - 1).map(|k| 0.5 * cross(corners[0], corners[k], corners[k + 1])).sum()
 }
 
 /// The part of a load per area that falls to each corner \[length^2\], shape \[corners\]: the integral of

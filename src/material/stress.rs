@@ -12,9 +12,10 @@ use rayon::prelude::*;
 use super::cells::Cells;
 use super::dilatation;
 use super::elastic::Elastic;
-use super::stiffness::{ShapeError, area, mean_gradients, mean_strain};
+use super::stiffness::{ShapeError, mean_gradients, mean_strain};
 use crate::flock::rules::Rotation;
 use crate::flock::vectors::Vectors;
+use crate::geometry::point::area;
 
 /// The state of a cell, or of the cells around a particle.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,3 +3,5 @@
 mod balance;
 mod elastica;
 mod support;
+#[path = "../common/tractions.rs"]
+mod tractions;

@@ -9,10 +9,11 @@ use flockform::geometry::outline::Outline;
 use flockform::geometry::shape::Shape;
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::material::fit::fit;
-use flockform::material::loads::{Loads, Traction};
 use flockform::material::weights::MaterialWeights;
 use flockform::solve::corotated;
 use flockform::solve::equilibrium::{Choice, Request, Solved, Solver};
+
+use crate::tractions;
 
 pub const KINDS: [fn(f64) -> LatticeKind; 6] = [
     |h| LatticeKind::Square { spacing: h },
@@ -56,9 +57,7 @@ impl Beam {
         let at = |x: f64, i: u32| (body.reference.x[i as usize] - x).abs() < 1e-9;
         let sides = cells.boundary_sides(&cells.incidence(body.count())).into_iter();
         let end = sides.filter(|&[a, b]| at(length, a) && at(length, b));
-        let tractions = end.map(|side| Traction::uniform(side, load)).collect();
-        let forces =
-            Loads { tractions, ..Loads::default() }.on_particles(&cells, &body.reference).expect("fits");
+        let forces = tractions::forces(&body.reference, end.map(|side| (side, [load; 2])));
         let near = cells.neighbours(body.count(), elastic);
         let weights = MaterialWeights::assemble(&cells, &body, near, elastic).expect("holds");
         let flock = Flock {

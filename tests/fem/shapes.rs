@@ -337,9 +337,9 @@ fn bodies_that_are_not_held_and_supports_beside_them_are_refused_by_name() {
     let material = Material::isotropic(1.0, 0.3, Plane::Stress, 1.0).unwrap();
     let mut problem = ShapeProblem::new(&plate, material);
     let solve = |problem: &ShapeProblem<'_>| solve_shape(problem, &Effort::default()).map(|_| ());
-    assert!(matches!(solve(&problem), Err(FemError::Unheld { motion: "translate along x", .. })));
+    assert!(matches!(solve(&problem), Err(FemError::Mechanism { motion: "translate along x", .. })));
     problem.supports.push(hold_at([0.0, 0.0], [true; 2], |_| [0.0; 2]));
-    assert!(matches!(solve(&problem), Err(FemError::Unheld { motion: "rotate", .. })));
+    assert!(matches!(solve(&problem), Err(FemError::Mechanism { motion: "rotate", .. })));
     let far = PlaneRegion::Disc { centre: [9.0, 9.0], radius: 1.0 };
     problem.supports.push(Support {
         on: Holding::Region(far),

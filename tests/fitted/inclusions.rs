@@ -5,10 +5,10 @@ use flockform::flock::lattice::Lattice;
 use flockform::flock::vectors::Vectors;
 use flockform::geometry::outline::Outline;
 use flockform::geometry::partition::Partition;
+use flockform::geometry::point::area;
 use flockform::geometry::shape::Shape;
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::material::fit::{FitError, Fitted, LEAST_AREA, LEAST_SIDE, LEAST_WIDTH, fit_regions};
-use flockform::material::stiffness::area;
 use flockform::material::weights::MaterialWeights;
 use nalgebra::{Matrix2, Vector2};
 

@@ -7,11 +7,11 @@ use flockform::flock::neighbourhood::{Neighbourhood, Neighbours};
 use flockform::flock::vectors::Vectors;
 use flockform::material::cells::Cells;
 use flockform::material::elastic::Elastic;
-use flockform::material::loads::{Loads, Traction};
 use flockform::material::weights::{MaterialWeights, Row};
 
 use crate::reference::beam_displacements;
 use crate::support::*;
+use crate::tractions;
 
 /// Points and displacements of a reference file, and the body with the same particles in its numbering.
 fn beam(aspect: u32) -> (Body, Neighbours, Cells, Vectors) {
@@ -65,8 +65,7 @@ fn the_beam_loaded_by_traction_matches_it() {
     let end = |i: u32| body.reference.x[i as usize] > 20.5;
     let sides = cells.boundary_sides(&cells.incidence(body.count()));
     let loaded = sides.into_iter().filter(|&[a, b]| end(a) && end(b));
-    let tractions = loaded.map(|side| Traction::uniform(side, [0.0, 50.0])).collect();
-    let forces = Loads { tractions, ..Loads::default() }.on_particles(&cells, &body.reference).expect("fits");
+    let forces = tractions::forces(&body.reference, loaded.map(|side| (side, [[0.0, 50.0]; 2])));
     let found = equilibrium(&weights, &leads, &forces, &truth);
     let errors =
         [relative_l2(&found, &truth, |i| !leads[i]), von_mises_error(&cells, &elastic, &found, &truth)];

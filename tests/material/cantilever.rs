@@ -7,10 +7,10 @@ use flockform::flock::body::Cut;
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::vectors::Vectors;
 use flockform::geometry::shape::Shape;
-use flockform::material::loads::{Loads, Traction};
 use flockform::material::weights::MaterialWeights;
 
 use crate::support::*;
+use crate::tractions;
 
 /// Relative L2 error of a Timoshenko cantilever of length 8 and depth 2 with `rows` cells over its
 /// depth, its root led by the exact solution, its end loaded by the parabolic shear of that solution.
@@ -37,12 +37,8 @@ fn cantilever_error(rows: u32, spacings: impl Fn(f64) -> LatticeKind) -> f64 {
         let y = body.reference.y[i as usize];
         [0.0, load / (2.0 * inertia) * (depth * depth / 4.0 - y * y)]
     };
-    let tractions = sides
-        .into_iter()
-        .filter(|&[a, b]| x(a) > length - 1e-9 && x(b) > length - 1e-9)
-        .map(|[a, b]| Traction { side: [a, b], at_ends: [shear(a), shear(b)] })
-        .collect();
-    let forces = Loads { tractions, ..Loads::default() }.on_particles(&cells, &body.reference).expect("fits");
+    let end = sides.into_iter().filter(|&[a, b]| x(a) > length - 1e-9 && x(b) > length - 1e-9);
+    let forces = tractions::forces(&body.reference, end.map(|side| (side, side.map(shear))));
     let truth: Vectors = body.reference.iter().map(exact).collect();
     let leads: Vec<bool> = (0..body.count() as u32).map(|i| x(i) < 1e-9).collect();
     let found = equilibrium(&weights, &leads, &forces, &truth);

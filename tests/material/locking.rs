@@ -9,11 +9,11 @@ use flockform::geometry::shape::Shape;
 use flockform::material::cells::neighbourhood_of;
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::material::fit::fit;
-use flockform::material::loads::{Loads, Traction};
 use flockform::material::stress::strain_energy;
 use flockform::material::weights::{MaterialWeights, WeightsError};
 
 use crate::support::*;
+use crate::tractions;
 
 const SPACINGS: [fn(f64) -> LatticeKind; 6] = [
     |h| LatticeKind::Square { spacing: h },
@@ -42,7 +42,7 @@ fn error(kind: LatticeKind, [min, max]: [[f64; 2]; 2], elastic: &Elastic, exact:
     let is_led = |i: usize| body.reference.x[i] < min[0] + 1e-9;
     let sides = cells.boundary_sides(&cells.incidence(body.count())).into_iter();
     let free = sides.filter(|side| !side.iter().all(|&i| is_led(i as usize)));
-    let tractions = free.map(|side| {
+    let pulls = free.map(|side| {
         let [a, b] = side.map(|i| body.reference.get(i as usize));
         let length = (b[0] - a[0]).hypot(b[1] - a[1]);
         let n = [(b[1] - a[1]) / length, (a[0] - b[0]) / length];
@@ -50,10 +50,9 @@ fn error(kind: LatticeKind, [min, max]: [[f64; 2]; 2], elastic: &Elastic, exact:
             let (_, [xx, yy, xy]) = exact(p);
             [xx * n[0] + xy * n[1], xy * n[0] + yy * n[1]]
         };
-        Traction { side, at_ends: [traction(a), traction(b)] }
+        (side, [traction(a), traction(b)])
     });
-    let loads = Loads { tractions: tractions.collect(), ..Loads::default() };
-    let forces = loads.on_particles(&cells, &body.reference).expect("fits");
+    let forces = tractions::forces(&body.reference, pulls);
     let truth: Vectors = body.reference.iter().map(|p| exact(p).0).collect();
     let leads: Vec<bool> = (0..body.count()).map(is_led).collect();
     let found = equilibrium(&weights, &leads, &forces, &truth);

@@ -10,3 +10,5 @@ mod refusals;
 #[path = "../common/samples.rs"]
 mod samples;
 mod support;
+#[path = "../common/tractions.rs"]
+mod tractions;

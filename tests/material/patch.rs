@@ -5,10 +5,10 @@ use flockform::flock::body::Cut;
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::vectors::{Vectors, distance};
 use flockform::material::cells::neighbourhood;
-use flockform::material::loads::{Loads, Traction};
 use flockform::material::weights::MaterialWeights;
 
 use crate::support::*;
+use crate::tractions;
 
 fn affine([x, y]: [f64; 2]) -> [f64; 2] {
     [0.2 + 0.03 * x - 0.01 * y, -0.1 + 0.04 * x + 0.02 * y]
@@ -132,10 +132,8 @@ fn an_edge_column_under_uniform_tension_stretches_uniformly_and_contracts_freely
         let pulled =
             |&[a, b]: &[u32; 2]| [a, b].iter().all(|&i| (body.reference.x[i as usize] - right).abs() < 1e-9);
         let sides = cells.boundary_sides(&cells.incidence(body.count()));
-        let tractions =
-            sides.into_iter().filter(pulled).map(|side| Traction::uniform(side, [50.0, 0.0])).collect();
-        let forces =
-            Loads { tractions, ..Loads::default() }.on_particles(&cells, &body.reference).expect("fits");
+        let pulls = sides.into_iter().filter(pulled).map(|side| (side, [[50.0, 0.0]; 2]));
+        let forces = tractions::forces(&body.reference, pulls);
         let exact: Vectors = body.reference.iter().map(|[x, y]| [0.05 * x, -0.33 * 0.05 * y]).collect();
         for i in 0..body.count() {
             if body.reference.x[i] > 0.0 {

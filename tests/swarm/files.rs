@@ -149,6 +149,20 @@ fn robots_fly_without_bounds_that_only_a_simulation_measures() {
     assert!(Flight::new(&swarm).is_err());
 }
 
+#[test]
+fn polygons_far_from_the_origin_of_the_coordinates_have_their_area() {
+    let square = "[[1e8, 1e8], [100000001.0, 1e8], [100000001.0, 100000001.0], [1e8, 100000001.0]]";
+    for table in [
+        format!("[limits]\ngeofence = {square}\n"),
+        format!("[[obstacles]]\nkind = \"polygon\"\nvertices = {square}\n"),
+    ] {
+        assert!(parse(&format!("{PAIR}{table}")).is_ok(), "{table}");
+        let flat = table.replace("100000001.0]", "1e8]");
+        let report = refusal(&format!("{PAIR}{flat}"));
+        assert!(report.contains("area"), "{report}");
+    }
+}
+
 /// What may be meant, and is likely not.
 #[test]
 fn what_is_doubtful_is_a_caution_before_the_flight() {

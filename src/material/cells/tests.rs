@@ -1,7 +1,7 @@
 use super::*;
 use crate::flock::body::Cut;
+use crate::geometry::point::area;
 use crate::material::elastic::{Constants, Plane};
-use crate::material::stiffness::area;
 
 fn body(kind: LatticeKind, orientation: f64) -> (Body, Neighbours) {
     let lattice = Lattice::new(kind, [5.0, -3.0], orientation);

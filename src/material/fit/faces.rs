@@ -5,7 +5,8 @@ use std::collections::{HashMap, HashSet};
 use crate::flock::lattice::Site;
 use crate::geometry::outline::Place;
 use crate::geometry::partition::Partition;
-use crate::material::stiffness::{area, centroid};
+use crate::geometry::point::area;
+use crate::material::stiffness::centroid;
 
 /// A corner of cells near the outline.
 #[derive(Clone, Copy, Debug)]

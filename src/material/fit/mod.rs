@@ -30,7 +30,6 @@ use self::faces::{Face, Faces};
 use self::near::NearPieces;
 use self::sites::{Columns, Sites};
 use super::cells::{Cells, templates};
-use super::stiffness::area;
 use crate::flock::body::{Body, OutlineParticles};
 use crate::flock::lattice::{Lattice, Site};
 use crate::flock::outlay::{Census, cell_width};
@@ -39,6 +38,7 @@ use crate::flock::vectors::{Vectors, distance};
 use crate::flock::window::Window;
 use crate::geometry::outline::{Outline, Place};
 use crate::geometry::partition::Partition;
+use crate::geometry::point::area;
 
 /// Lattice points this near to the outline move onto it, in least altitudes of a cell.
 pub const SNAP: f64 = 0.4;

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use super::faces::{Face, Faces, ways};
 use super::{LEAST_AREA, LEAST_SIDE, LEAST_WIDTH, ROUNDING, Scale};
 use crate::flock::vectors::distance;
+use crate::geometry::point;
 
 /// One makes work for the other: after a few rounds nothing is left to do.
 const ROUNDS: usize = 4;
@@ -25,11 +26,7 @@ pub fn tidy(faces: &mut Faces, scale: &Scale) {
 }
 
 fn area(faces: &Faces, corners: &[u32]) -> f64 {
-    let at = |k: usize| faces.nodes[corners[k % corners.len()] as usize].point;
-    let o = at(0);
-    let from = |p: [f64; 2]| [p[0] - o[0], p[1] - o[1]];
-    let cross = |a: [f64; 2], b: [f64; 2]| a[0] * b[1] - a[1] * b[0];
-    (1..corners.len()).map(|k| 0.5 * cross(from(at(k)), from(at(k + 1)))).sum()
+    point::area(corners.iter().map(|&k| &faces.nodes[k as usize].point))
 }
 
 /// Least extent of a face across one of its sides \[length\].

@@ -2,8 +2,9 @@
 
 use crate::flock::block::{Block, plus};
 use crate::flock::lattice::{Lattice, Site};
+use crate::geometry::point::area;
 use crate::material::cells::templates;
-use crate::material::stiffness::{area, mean_gradients};
+use crate::material::stiffness::mean_gradients;
 
 pub fn add(row: &mut Vec<(Site, Block)>, offset: Site, block: &Block) {
     match row.iter_mut().find(|(known, _)| *known == offset) {

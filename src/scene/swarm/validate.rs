@@ -8,6 +8,7 @@ use super::recording;
 use super::{NamedManoeuvre, Shape, Swarm};
 use crate::flock::manoeuvre::{Leg, Posture};
 use crate::flock::rules::Rule;
+use crate::geometry::point::area;
 use crate::scene::document::Document;
 use crate::scene::document::problem::SceneError;
 use crate::scene::raw::{
@@ -267,7 +268,7 @@ fn check_safety(raw: &RawSwarm, refuse: Refuse<'_>) -> Result<(), SceneError> {
             return Err(refuse(&format!("obstacles[{k}].vertices"), message, "give its corners in order"));
         }
     }
-    if let Some(fence) = raw.limits.geofence.as_ref().filter(|fence| area(fence).abs() == 0.0) {
+    if let Some(fence) = raw.limits.geofence.as_ref().filter(|fence| area(*fence).abs() == 0.0) {
         let message = format!("the fence of {} corners holds no area", fence.len());
         return Err(refuse("limits.geofence", message, "give its corners in order"));
     }
@@ -277,11 +278,6 @@ fn check_safety(raw: &RawSwarm, refuse: Refuse<'_>) -> Result<(), SceneError> {
 /// The first of these that is the same as one before it.
 fn repeated<T: PartialEq>(all: &[T]) -> Option<usize> {
     (1..all.len()).find(|&n| all[..n].contains(&all[n]))
-}
-
-fn area(corners: &[[f64; 2]]) -> f64 {
-    let next = corners.iter().cycle().skip(1);
-    corners.iter().zip(next).map(|(a, b)| 0.5 * (a[0] * b[1] - a[1] * b[0])).sum()
 }
 
 fn check_flight(raw: &RawSwarm, refuse: Refuse<'_>) -> Result<(), SceneError> {

@@ -4,8 +4,9 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::reference::{Reference, ReferenceError};
+use super::reference::Reference;
 use crate::continuum::places::AtPlace;
+use crate::fem::FemError;
 use crate::flock::vectors::Vectors;
 
 /// Displacement and stress at one place of the body, by the rule and by the truth.
@@ -24,7 +25,7 @@ pub struct PlaceComparison {
 pub(crate) fn compare_places(
     rule: Vec<AtPlace>,
     truth: &Reference,
-) -> Result<Vec<PlaceComparison>, ReferenceError> {
+) -> Result<Vec<PlaceComparison>, FemError> {
     let places: Vectors = rule.iter().map(|at| at.place).collect();
     let (moved, stress) = (truth.displacements_at(&places)?, truth.stress_at(&places)?);
     let of = |((rule, displacement), stress): ((AtPlace, [f64; 2]), crate::fem::Stress)| {

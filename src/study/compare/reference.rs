@@ -52,48 +52,12 @@ pub struct Reference {
     spacing: f64,
 }
 
-/// Error computing the truth.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ReferenceError {
-    /// A part of the body is free to move as a whole.
-    #[error(
-        "the finite elements have no equilibrium: the part of the body around ({:.6}, {:.6}) is not held and free to {motion}", .place[0], .place[1]
-    )]
-    Mechanism {
-        /// A place of that part \[length\].
-        place: Point,
-        /// How it can move, in words.
-        motion: &'static str,
-    },
-    /// The stiffness cannot be inverted in double precision.
-    #[error(
-        "the finite elements have no equilibrium: the body is soft beyond what a double resolves, most of all near ({:.6}, {:.6})", .place[0], .place[1]
-    )]
-    Singular {
-        /// Where the body is softest \[length\].
-        place: Point,
-    },
-    /// Any other reason of the finite elements.
-    #[error("the truth cannot be computed: {0}")]
-    Fem(FemError),
-}
-
-impl From<FemError> for ReferenceError {
-    fn from(error: FemError) -> Self {
-        match error {
-            FemError::Unheld { x, y, motion } => Self::Mechanism { place: [x, y], motion },
-            FemError::Soft { x, y } => Self::Singular { place: [x, y] },
-            other => Self::Fem(other),
-        }
-    }
-}
-
 impl Reference {
     /// Solves until the truth's own error is what `effort` asks for.
     ///
     /// # Errors
     /// Names the place at which the shape is not held, or what keeps it from being meshed.
-    pub fn solve(setting: Setting<'_>, effort: &Effort) -> Result<Self, ReferenceError> {
+    pub fn solve(setting: Setting<'_>, effort: &Effort) -> Result<Self, FemError> {
         Self::solve_with(setting, Vec::<(_, fn(Point, Point) -> Point)>::new(), effort)
     }
 
@@ -102,7 +66,7 @@ impl Reference {
         setting: Setting<'a>,
         more: Vec<(Vec<Portion>, impl Fn(Point, Point) -> Point + 'a)>,
         effort: &Effort,
-    ) -> Result<Self, ReferenceError> {
+    ) -> Result<Self, FemError> {
         let Setting { outline, inclusions, reference, spacing, elastic, rotation, supports, loads } = setting;
         let mut problem = ShapeProblem::new(outline, material(elastic)?);
         if let Some((partition, elastics)) = inclusions {
@@ -163,7 +127,7 @@ impl Reference {
     ///
     /// # Errors
     /// Names the first point further outside.
-    pub fn displacements_at(&self, points: &Vectors) -> Result<Vectors, ReferenceError> {
+    pub fn displacements_at(&self, points: &Vectors) -> Result<Vectors, FemError> {
         let places: Vec<Point> = points.iter().collect();
         Ok(self.solution.displacements_within(&places, self.spacing)?.into_iter().collect())
     }
@@ -179,9 +143,9 @@ impl Reference {
     ///
     /// # Errors
     /// Names the first place further outside.
-    pub fn stress_at(&self, places: &Vectors) -> Result<Vec<Stress>, ReferenceError> {
+    pub fn stress_at(&self, places: &Vectors) -> Result<Vec<Stress>, FemError> {
         let places: Vec<Point> = places.iter().collect();
-        Ok(self.solution.stress_within(&places, self.spacing)?)
+        self.solution.stress_within(&places, self.spacing)
     }
 }
 

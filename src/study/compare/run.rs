@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::measures::{Comparison, Sides, energy_norm, von_mises};
 use super::places::{PlaceComparison, compare_places};
-use super::reference::{Reference, ReferenceError, Setting};
+use super::reference::{Reference, Setting};
 use super::split::ErrorParts;
 use super::supports::supports;
 use crate::continuum::equilibrium::run_to_equilibrium;
@@ -263,18 +263,22 @@ fn require_known(scene: &Scene, truth: &Reference, changes: &[RoleChange]) -> Re
     Ok(())
 }
 
-pub(super) fn refused(scene: &Scene, error: &ReferenceError) -> SceneError {
+pub(super) fn refused(scene: &Scene, error: &FemError) -> SceneError {
     let (key, help) = match error {
-        ReferenceError::Mechanism { .. } => {
+        FemError::Mechanism { .. } => {
             ("roles", "clamp at least two particles of every part, or lead them by a motion of their own")
         }
-        ReferenceError::Singular { .. } => ("body.shape", "use a larger shape, or hold it in more places"),
-        ReferenceError::Fem(FemError::Unmeshable { .. } | FemError::InvertedCell { .. }) => {
+        FemError::Singular { .. } => ("body.shape", "use a larger shape, or hold it in more places"),
+        FemError::Unmeshable { .. } | FemError::InvertedCell { .. } => {
             ("body.shape", "keep corners, holes and supports further apart")
         }
-        ReferenceError::Fem(FemError::EmptySupport { .. }) => ("roles", "move the region onto the body"),
-        ReferenceError::Fem(FemError::Lost { .. }) => ("loads", "load it less, or lead it there"),
+        FemError::EmptySupport { .. } => ("roles", "move the region onto the body"),
+        FemError::Lost { .. } => ("loads", "load it less, or lead it there"),
         _ => ("material", "use constants, lattice and loads less far apart"),
     };
-    scene.refuse(key, error.to_string(), help)
+    let what = match error {
+        FemError::Mechanism { .. } | FemError::Singular { .. } => "the finite elements have no equilibrium",
+        _ => "the truth cannot be computed",
+    };
+    scene.refuse(key, format!("{what}: {error}"), help)
 }

@@ -16,6 +16,7 @@ use parry2d::shape::{Ball, Segment};
 use super::cell::{HalfPlane, nearest};
 use super::limits::{Place, SafetyError};
 use crate::geometry::box_tree::BoxTree;
+use crate::geometry::point::{area, minus};
 use crate::geometry::shape::{crossing, segments_cross};
 
 /// A solid \[m, world frame\].
@@ -414,13 +415,9 @@ fn check_polygon(corners: &[[f64; 2]], place: Place) -> Result<f64, SafetyError>
             return Err(SafetyError::TooDense { place, count });
         }
     }
-    let [ox, oy] = corners[0];
-    let (mut twice_area, mut extent) = (0.0, 0.0_f64);
-    for k in 0..count {
-        let ([ax, ay], [bx, by]) = edge(k);
-        twice_area += (ax - ox) * (by - oy) - (bx - ox) * (ay - oy);
-        extent = extent.max((ax - ox).abs()).max((ay - oy).abs());
-    }
+    let twice_area = 2.0 * area(corners);
+    let extent =
+        corners.iter().flat_map(|&p| minus(p, corners[0])).fold(0.0, |most: f64, off| most.max(off.abs()));
     if twice_area.abs() <= 1e-12 * extent * extent {
         return Err(SafetyError::NoArea { place });
     }

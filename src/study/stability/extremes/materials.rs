@@ -8,7 +8,6 @@ use crate::flock::rules::{Mean, Rotation, Rule};
 use crate::flock::vectors::{Vectors, distance};
 use crate::material::cells::{Cells, neighbourhood};
 use crate::material::elastic::{Constants, Elastic, Plane};
-use crate::material::loads::{Loads, Traction};
 use crate::material::weights::MaterialWeights;
 use crate::scene::{Scene, SceneError};
 use crate::solve::equilibrium::{Choice, Request, Solver, solve};
@@ -83,17 +82,16 @@ fn stress(overrides: &[&str]) -> Result<Outcome, SceneError> {
     let displaced: Vectors =
         reference.iter().map(|[x, y]| [strain[0] * x + strain[2] * y, strain[1] * y]).collect();
     let [xx, yy, xy] = elastic.stress(strain).map(|stress| stress * elastic.thickness());
-    let outline = cells.boundary_sides(&cells.incidence(reference.len()));
-    let traction = |side: [u32; 2]| {
+    let mut pushed = Vectors::zeros(reference.len());
+    for side in cells.boundary_sides(&cells.incidence(reference.len())) {
         let [[ax, ay], [bx, by]] = side.map(|i| reference.get(i as usize));
-        let length = (bx - ax).hypot(by - ay);
-        // The body lies to the left.
-        let [nx, ny] = [(by - ay) / length, (ax - bx) / length];
-        Traction::uniform(side, [xx * nx + xy * ny, xy * nx + yy * ny])
-    };
-    let loads = Loads { tractions: outline.into_iter().map(traction).collect(), ..Loads::default() };
-    let pushed =
-        loads.on_particles(cells, reference).map_err(|error| scene.refuse("loads", error.to_string(), ""))?;
+        // Half of the side, turned outwards: the body lies to the left.
+        let [nx, ny] = [0.5 * (by - ay), 0.5 * (ax - bx)];
+        for i in side {
+            pushed.x[i as usize] += xx * nx + xy * ny;
+            pushed.y[i as usize] += xy * nx + yy * ny;
+        }
+    }
     let largest = pushed.iter().map(|p| distance(p, [0.0; 2])).fold(0.0, f64::max);
     let left = |i: usize| {
         let ([fx, fy], [px, py]) = (weights.force(i, &displaced), pushed.get(i));
