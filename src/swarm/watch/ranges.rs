@@ -102,10 +102,12 @@ impl Watch {
     /// the member then waits as if it had never been heard, but for its place.
     pub(super) fn weigh_by_ranges(&mut self, member: usize, pose: &Pose) -> Result<(), Rejection> {
         let Some(RangeLimits { max_faulty, .. }) = self.limits.ranges else { return Ok(()) };
-        let rings = self.rings(member, pose.stamp);
+        let rings = self.rings(member, pose.stamp, self.limits.age_limit);
         if let Err(contradicted) = weigh(&rings, pose, max_faulty) {
             let accepted = self.members[member].accepted;
-            let is_false = |last: Pose| weigh(&self.rings(member, last.stamp), &last, max_faulty).is_err();
+            let is_false = |last: Pose| {
+                weigh(&self.rings(member, last.stamp, self.limits.age_limit), &last, max_faulty).is_err()
+            };
             let was_false = accepted.is_some_and(is_false);
             let watched = &mut self.members[member];
             watched.is_doubted = true;
@@ -117,6 +119,8 @@ impl Watch {
         if !self.members[member].is_doubted {
             return Ok(());
         }
+        // What was measured before may be of where it lied from: only what is measured now confirms.
+        let rings = self.rings(member, pose.stamp, self.limits.fresh);
         let mut places = Places::of(&rings, max_faulty);
         if let Some(last) = self.members[member].accepted {
             // One that is not used gets no target, and stands by then.
@@ -134,20 +138,21 @@ impl Watch {
             let watched = &self.members[member];
             if watched.is_doubted
                 && !watched.health.is_usable()
-                && let Some(place) = Places::of(&self.rings(member, now), max_faulty).only()
+                && let Some(place) =
+                    Places::of(&self.rings(member, now, self.limits.age_limit), max_faulty).only()
             {
                 self.members[member].place = Some(place);
             }
         }
     }
 
-    /// What was measured of a member about a time \[s\], by those that have a pose.
-    fn rings(&self, member: usize, stamp: f64) -> Vec<Ring> {
+    /// What was measured of a member no more than `within` \[s\] from a time \[s\], by those that have a pose.
+    fn rings(&self, member: usize, stamp: f64, within: f64) -> Vec<Ring> {
         let Some(RangeLimits { tolerance, .. }) = self.limits.ranges else { return Vec::new() };
         let ring = |one: &Measured| {
             let present = self.pose(one.observer)?;
             let (range, then) = one.at(stamp);
-            if (stamp - range.stamp).abs() > self.limits.age_limit {
+            if (stamp - range.stamp).abs() > within {
                 return None;
             }
             // The pose known at the time, or the present one: the nearer in time.
@@ -328,7 +333,10 @@ mod tests {
             send(&mut watch, 0.1, lie, &[0, 1, 2, 3]),
             Err(Rejection::Contradicted { against: 4, .. })
         ));
-        let mut now = 0.1;
+        // What it says now may be true by what was measured before, and is not confirmed by it.
+        let ahead = send(&mut watch, 0.5, [2.2, 2.0], &[]);
+        assert!(matches!(ahead, Err(Rejection::Unconfirmed { measured: 0 })), "{ahead:?}");
+        let mut now = 0.5;
         let mut for_a_while = |watch: &mut Watch, claims, observers: &[usize]| {
             for k in 0..50 {
                 now += 0.1;
