@@ -9,12 +9,11 @@ use crate::sweep::Sweep;
 /// Share of the followers' updates that the motion of the leaders can reach within `stop.steps` \[1\]; the others
 /// are known to change nothing and are left out. `None` where every update is made: the sweep of this scene does not
 /// look for what stands still.
-pub fn active_share(plan: &Plan) -> Option<f64> {
-    let Setup { body, flock, changes, update, roles, present_radius, .. } = &plan.setup;
+pub fn active_share(plan: &Plan, sweep: &Sweep) -> Option<f64> {
+    let Setup { body, flock, changes, present_radius, .. } = &plan.setup;
     let looks = looks_at_every_step(present_radius.is_some(), flock, changes);
-    let sweep = || Sweep::compile(*update, flock, roles);
     // A load moves all of a body at once.
-    if looks || flock.forces.is_some() || !sweep().takes_several(body.frame.as_ref()) {
+    if looks || flock.forces.is_some() || !sweep.takes_several(body.frame.as_ref()) {
         return None;
     }
     let steps = plan.stop.steps;

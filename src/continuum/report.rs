@@ -202,7 +202,7 @@ fn facts(
         ("lattice", lattice),
         ("neighbour entries", format!("{bonds} ({:.2} a particle)", bonds as f64 / plan.count() as f64)),
     ];
-    let moving = active_share(plan).filter(|_| scene.equilibrium.is_none()).map(|share| {
+    let moving = active_share(plan, &sweep).filter(|_| scene.equilibrium.is_none()).map(|share| {
         (
             "computed",
             format!("about {:.0} % of the updates: motion spreads by one neighbour a step", 100.0 * share),

@@ -286,7 +286,7 @@ mod tests {
         for (late, dies) in [0, 3, 7].into_iter().flat_map(|late| (20..60).map(move |dies| (late, dies))) {
             let (mut robot, mut track) = (Robot::at([0.0; 2], 0.0), Track::default());
             let (mut poses, mut places) = (Vec::new(), Vec::new());
-            for k in 0..80 {
+            for k in 0usize..80 {
                 let now = k as f64 * PERIOD;
                 if k < dies {
                     poses.push(Pose { position: robot.position, yaw: 0.0, stamp: now, frame_is_right: true });
