@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RawLimits {
-    /// [m/s]. It bounds how far a robot is from its last pose: without it no clearance is kept where poses are late or lost.
+    /// It bounds how far a robot is from its last pose: without it no clearance is kept where poses are late or lost [m/s].
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub speed: Option<f64>,
-    /// [m/s^2]. Robots of the model double-integrator keep it always. The others put clearance, speed and fence first: where
-    /// one comes upon another, or upon an obstacle, too fast, it is exceeded, and the report of a flight says how often.
+    /// Robots of the model double-integrator keep it always. The others put clearance, speed and fence first: where one comes
+    /// upon another, or upon an obstacle, too fast, it is exceeded, and the report of a flight says how often [m/s^2].
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub acceleration: Option<f64>,
     /// Free space kept between the rims of two robots, and of a robot and an obstacle [m]. Without it
