@@ -165,6 +165,9 @@ fn singles_are_taken_where_the_accuracy_allows_them_and_the_rule_where_it_is_ope
 
 const PUSHED: &str =
     "loads=[{ kind = \"force\", region = { kind = \"edge\", side = \"right\" }, force = [0.0, -0.1] }]";
+/// Holds the first column, and at less than 0.4 of the spacing the second one too.
+const BOX: &str =
+    "roles=[{ region = { kind = \"box\", min = [10.0, 10.0], max = [10.4, 21.0] }, role = \"clamped\" }]";
 const DISC: &str = "body.shape={ kind = \"disc\", centre = [0.0, 0.0], radius = 10.0 }";
 
 #[test]
@@ -182,7 +185,11 @@ fn an_accuracy_that_cannot_be_had_is_refused_with_the_reason() {
         (refused("beam-loaded", &[PUSHED], "1%"), "in which it pushes more particles"),
         (
             refused("beam-loaded", &[DISC, "lattice.spacing=2.0"], "0.5%"),
-            "less of a curved side is outermost",
+            "less of a side that is not straight is outermost",
+        ),
+        (
+            refused("beam-loaded", &[BOX], "0.1%"),
+            "particles from [10.0, 10.0] to [10.25, 21.0] instead of [10.0, 10.0] to [10.0, 21.0]",
         ),
         (refused("beam-loaded", &["lattice.spacing=2.75"], "0.0001"), "after 5 halvings of the spacing"),
     ] {

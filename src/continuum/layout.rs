@@ -2,7 +2,7 @@
 
 mod loads;
 pub(super) mod refusals;
-pub(super) mod regions;
+pub(crate) mod regions;
 pub mod roles;
 
 use std::sync::Arc;

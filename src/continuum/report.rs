@@ -8,6 +8,7 @@ use super::deviation::{Deviation, pieces};
 use super::edge_stress;
 use super::equilibrium::select_solver;
 use super::late;
+use super::layout::regions::uneven_sides;
 use super::memory::neighbour_entries;
 use super::plan::Plan;
 use crate::flock::fracture::Threshold;
@@ -278,6 +279,7 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
     }
     cautions.extend(bulk_response::cautions(scene));
     cautions.extend(dead_pressure(scene));
+    cautions.extend(uneven_sides(scene));
     cautions.extend(late::cautions(scene));
     if let (Some(edge), Some(cells)) = (&plan.setup.free_edge, &plan.setup.cells) {
         let body = &plan.setup.body;

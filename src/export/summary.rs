@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::error::{ExportError, write_file};
 use super::{OutputFolder, bonds, largest_strain};
 use crate::continuum::late;
+use crate::continuum::layout::regions::uneven_sides;
 use crate::continuum::mechanics::{Mechanics, Peak, Stresses};
 use crate::continuum::places::{AtPlace, at_places};
 use crate::continuum::report::dead_pressure;
@@ -262,7 +263,11 @@ fn cautions(scene: &Scene, engine: &Engine, measured: Option<&Measured>) -> Vec<
     let of_forces = |measured: &Measured| {
         dead_pressure(scene).into_iter().chain(measured.mechanics.cautions(engine)).collect::<Vec<_>>()
     };
-    late::cautions(scene).into_iter().chain(measured.map(of_forces).into_iter().flatten()).collect()
+    uneven_sides(scene)
+        .into_iter()
+        .chain(late::cautions(scene))
+        .chain(measured.map(of_forces).into_iter().flatten())
+        .collect()
 }
 
 impl Measured {

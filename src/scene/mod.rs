@@ -104,6 +104,17 @@ impl Scene {
         SceneError::from(self.document.problem(key, message, Some(help.into())))
     }
 
+    /// The regions of roles, and of loads that have one, each with its key.
+    pub(crate) fn regions(&self) -> impl Iterator<Item = (String, &SceneRegion)> {
+        let of_roles = self.roles.iter().map(|entry| &entry.region).enumerate();
+        let of_loads = self.loads.iter().enumerate().filter_map(|(k, load)| match load {
+            Load::Outline { region, .. } | Load::Force { region, .. } => Some((k, region)),
+            Load::Body { .. } => None,
+        });
+        let named = |of: &'static str| move |(k, region)| (format!("{of}[{k}].region"), region);
+        of_roles.map(named("roles")).chain(of_loads.map(named("loads")))
+    }
+
     /// Which role entry, if any, first leads particles to where finite elements have them.
     pub(crate) fn led_by_reference(&self) -> Option<usize> {
         self.roles.iter().position(|entry| matches!(entry.motion, Some(LeaderMotion::Reference { .. })))

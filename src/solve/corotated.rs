@@ -5,6 +5,8 @@
 //! neighbours. It is positive definite wherever the body rests stably, so every solver will do; on the way to there it need
 //! not be, and an increment whose system has no positive solution is taken in smaller parts.
 //!
+//! An equilibrium counts where its own tangent is positive: a straight column is in equilibrium under any load, and buckles.
+//!
 //! Leaders go their way and loads grow in increments, halved where Newton's method does not settle or a cell turns too far
 //! at once: that keeps to the equilibrium that the unstrained body grows into.
 //!
@@ -44,6 +46,9 @@ const LEAST_STRIDE: f64 = 1.0 / 1024.0;
 const ON_THE_WAY: f64 = 1e-3;
 /// Cosine of the largest turn of a cell in one increment: 60 degrees.
 const LEAST_COSINE: f64 = 0.5;
+/// Size of a last step, over that of the displacements, up to which its tangent is that of where it led to.
+const NEAR: f64 = 1e-2;
+const DIRECT: Choice = Choice::This(Solver::Direct);
 /// Residual of each linear system: more digits than a Newton step has.
 const OF_A_STEP: f64 = 1e-5;
 
@@ -401,6 +406,32 @@ impl Corotated<'_> {
             None => Ok(whole(own?).of_part(part.clone())),
         }
     }
+
+    /// Whether the energy has a minimum here: whether forces without any symmetry are borne.
+    fn is_stable(&self, locals: &[Option<Local>]) -> Result<bool, CorotatedError> {
+        let force = |(i, local): (usize, &Option<Local>)| {
+            let free = self.free(i).map(|free| free && local.is_some());
+            let of_axis = |axis: usize| {
+                let share = (2 * self.body.index(i) + axis) as f64 * 0.618_033_988_749_895;
+                if free[axis] { share.fract() - 0.5 } else { 0.0 }
+            };
+            [0, 1].map(of_axis)
+        };
+        let forces = locals.iter().enumerate().map(force).collect();
+        let system = self.system(locals, [forces, Vectors::zeros(locals.len())]);
+        let solved = solve_linear(
+            &system.map_err(NotLinear::Operator)?,
+            &self.step,
+            self.part.as_ref().map(|part| &part.team),
+        );
+        match solved {
+            Ok(_) => Ok(true),
+            Err(SolveError::NotPositive { .. } | SolveError::Diverged { .. } | SolveError::Loose { .. }) => {
+                Ok(false)
+            }
+            Err(error) => Err(error.into()),
+        }
+    }
 }
 
 /// Newton's method along the way.
@@ -491,7 +522,10 @@ impl Newton<'_> {
             _ => true,
         };
         let is_far = rule.any(!turns.iter().zip(&locals).all(near));
-        Ok((is_settled && !is_far).then_some(u))
+        // An iteration sees of a system what its right-hand side has in it; a factorisation sees all.
+        let is_seen = self.last_step <= NEAR && (is_rounding || rule.step.solver == DIRECT);
+        let is_taken = is_settled && !is_far && (is_seen || rule.is_stable(&locals)?);
+        Ok(is_taken.then_some(u))
     }
 
     /// One step of Newton's method, the leaders moving by `led`.

@@ -1,8 +1,11 @@
 //! Action is reaction, and rest is a minimum of an energy.
 
+use std::f64::consts::PI;
+
 use flockform::flock::law::Weights;
 use flockform::flock::rules::Corner;
 use flockform::flock::vectors::{Vectors, distance};
+use flockform::solve::corotated::CorotatedError;
 use flockform::solve::equilibrium::Solver;
 
 use crate::support::*;
@@ -82,6 +85,29 @@ fn rest_is_a_minimum_of_the_energy() {
                     }
                     assert!(energy(&beam, &other) > least, "{seed} {size}");
                 }
+            }
+        }
+    }
+}
+
+/// L. Euler: a straight column that is clamped at one end is stable up to a load of pi^2 E I / (4 L^2) on the other.
+#[test]
+fn a_straight_column_beyond_its_euler_load_is_no_equilibrium_whatever_solves_it() {
+    let (length, young) = (20.0, 12.0);
+    let euler = (PI / length).powi(2) * young / 12.0 / 4.0;
+    let solvers = [Solver::Direct, Solver::ConjugateGradients, Solver::Multigrid];
+    for (kind, solver) in
+        [KINDS[0], KINDS[3]].into_iter().flat_map(|kind| solvers.map(|solver| (kind, solver)))
+    {
+        let column =
+            |load: f64| Beam::new(kind(0.25), length, &sheet(young, 0.0), [-load, 0.0]).solve_by(solver);
+        assert!(column(0.9 * euler).is_ok_and(|solved| solved.converged), "{solver}");
+        for over in [3.0, 30.0] {
+            match column(over * euler) {
+                Err(CorotatedError::Unsettled { part, .. }) => {
+                    assert!((0.95..1.2).contains(&(over * part)), "{solver}: {part} of {over}");
+                }
+                other => panic!("{solver}, {over}: {:?}", other.map(|solved| solved.residuals)),
             }
         }
     }

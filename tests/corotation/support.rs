@@ -10,7 +10,7 @@ use flockform::geometry::shape::Shape;
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::material::fit::fit;
 use flockform::material::weights::MaterialWeights;
-use flockform::solve::corotated;
+use flockform::solve::corotated::{self, CorotatedError};
 use flockform::solve::equilibrium::{Choice, Request, Solved, Solver};
 
 use crate::tractions;
@@ -94,6 +94,10 @@ impl Beam {
     }
 
     pub fn solved_by(&self, solver: Solver) -> Solved {
+        self.solve_by(solver).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    pub fn solve_by(&self, solver: Solver) -> Result<Solved, CorotatedError> {
         let way = |_: f64| Vectors::zeros(self.body.count());
         let request = Request { solver: Choice::This(solver), tolerance: 1e-12, ..Request::default() };
         corotated::solve(
@@ -104,7 +108,6 @@ impl Beam {
             &corotated::Way::whole(&way),
             &request,
         )
-        .unwrap_or_else(|error| panic!("{error}"))
     }
 
     pub fn load(&self, i: usize) -> [f64; 2] {

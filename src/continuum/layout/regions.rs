@@ -4,17 +4,53 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::Layout;
-use crate::flock::body::Body;
+use crate::flock::body::{Body, Cut};
 use crate::flock::region::{Region, Side};
 use crate::flock::vectors::distance;
 use crate::geometry::locate::Finder;
 use crate::geometry::outline::{Outline, Place};
 use crate::geometry::portion::{Portion, Selection};
 use crate::material::boundary::Boundary;
-use crate::scene::{Scene, SceneError, SceneRegion};
+use crate::scene::{BodySource, Scene, SceneError, SceneRegion};
 
 /// Depth within which particles stand on a flat side \[spacings\].
 pub(in crate::continuum) const FLAT: f64 = 1e-6;
+
+/// The parts of an outline no farther in than a depth from the outermost coordinate on a side \[length\].
+fn band(outline: &Outline, side: Side, depth: f64, grain: f64) -> Vec<Portion> {
+    let (low, high) = outline.bounds();
+    let (mut min, mut max) = (low, high);
+    match side {
+        Side::Left => max[0] = low[0] + depth,
+        Side::Right => min[0] = high[0] - depth,
+        Side::Bottom => max[1] = low[1] + depth,
+        Side::Top => min[1] = high[1] - depth,
+    }
+    outline.portions(&Selection::Box { min, max }, grain)
+}
+
+/// The warnings about regions that hold what is outermost on a side that is not straight, and less of it the narrower the
+/// spacing is.
+pub(crate) fn uneven_sides(scene: &Scene) -> Vec<String> {
+    let outline = match &scene.body {
+        BodySource::Cut(Cut::Shape(shape)) if scene.is_fitted => Outline::of_shape(shape).ok(),
+        _ => None,
+    };
+    let grain = 1e-9 * scene.lattice.spacing();
+    let is_uneven = |region: &SceneRegion| match (region, &outline) {
+        (SceneRegion::Outermost(side), Some(outline)) => band(outline, *side, 0.0, grain).is_empty(),
+        _ => false,
+    };
+    let uneven = scene.regions().filter(|(_, region)| is_uneven(region));
+    uneven
+        .map(|(key, _)| {
+            format!(
+                "{key}: no side is straight there, so that it holds what is within half a spacing of the outermost \
+                 place, and less with a narrower spacing; give it a depth, or kind = \"outline\" and pieces"
+            )
+        })
+        .collect()
+}
 
 impl Layout {
     /// The parts of the outline in the region that stands at `key`.
@@ -50,17 +86,7 @@ impl Layout {
     fn portions_of(&self, region: &SceneRegion, outline: &Outline) -> Vec<Portion> {
         let spacing = self.body.lattice.spacing();
         let grain = 1e-9 * spacing;
-        let (low, high) = outline.bounds();
-        let band = |side: Side, depth: f64| {
-            let (mut min, mut max) = (low, high);
-            match side {
-                Side::Left => max[0] = low[0] + depth,
-                Side::Right => min[0] = high[0] - depth,
-                Side::Bottom => max[1] = low[1] + depth,
-                Side::Top => min[1] = high[1] - depth,
-            }
-            outline.portions(&Selection::Box { min, max }, grain)
-        };
+        let band = |side: Side, depth: f64| band(outline, side, depth, grain);
         match region {
             SceneRegion::Outline(selection) => outline.portions(selection, grain),
             SceneRegion::Outermost(side) => match band(*side, 0.0) {
@@ -158,9 +184,8 @@ impl Layout {
 
     /// Whether the shape is flat on a side, so that its outermost particles are those along that.
     pub(crate) fn is_flat(&self, side: Side) -> bool {
-        self.outline.as_ref().is_some_and(|outline| {
-            !self.portions_of(&SceneRegion::Known(Region::Edge { side, depth: 0.0 }), outline).is_empty()
-        })
+        let grain = 1e-9 * self.body.lattice.spacing();
+        self.outline.as_ref().is_some_and(|outline| !band(outline, side, 0.0, grain).is_empty())
     }
 
     /// The particles at the outermost coordinate on a side; of a body that has no flat side there, those half a spacing

@@ -12,6 +12,7 @@ use crate::continuum::layout::Layout;
 use crate::continuum::run::Outcome;
 use crate::flock::region::Region;
 use crate::flock::role::Role;
+use crate::flock::vectors::distance;
 use crate::scene::raw::RawMean;
 use crate::scene::{Load, Scene, SceneError, SceneRegion};
 use crate::solve::equilibrium::{Precision, Request};
@@ -57,7 +58,7 @@ pub fn choose(scene: Scene, load: LoadScene<'_>) -> Result<Chosen, SceneError> {
         return Ok(Chosen { scene, words, estimate: None });
     }
     let mut nearest = f64::INFINITY;
-    let mut particles = 0;
+    let (mut particles, mut written) = (0, None);
     for halvings in 0..=MOST_HALVINGS {
         let part = 0.5f64.powi(halvings as i32);
         // Half the spacing is four times as many.
@@ -65,6 +66,22 @@ pub fn choose(scene: Scene, load: LoadScene<'_>) -> Result<Chosen, SceneError> {
             break;
         }
         let body = Body::new(&scene, load, part, accuracy)?;
+        let extents = extents_of_roles(&body.scene, &body.truth.layout)?;
+        let mut pairs = written.get_or_insert_with(|| extents.clone()).iter().zip(&extents);
+        if let Some(((key, before), (_, now))) = pairs.find(|(before, now)| {
+            let apart = |k: usize| distance(before.1[k], now.1[k]);
+            apart(0).max(apart(1)) > 1e-6 * body.scene.lattice.spacing()
+        }) {
+            let message = format!(
+                "the accuracy takes a finer body, of which it holds particles from {:?} to {:?} instead of {:?} to {:?}",
+                now[0], now[1], before[0], before[1]
+            );
+            return Err(scene.refuse(
+                key,
+                message,
+                "pick pieces of the outline, write a smaller spacing, or ask for less",
+            ));
+        }
         let solved =
             body.solve(&[format!("equilibrium.tolerance={TIGHT:e}"), DOUBLES.into(), ANY_SOLVER.into()])?;
         particles = solved.particles;
@@ -215,28 +232,44 @@ fn words(solved: &Solved, accuracy: f64, part: f64) -> String {
     )
 }
 
+/// From where to where particles take roles by place, by key \[length\].
+fn extents_of_roles(scene: &Scene, layout: &Layout) -> Result<Vec<(String, [[f64; 2]; 2])>, SceneError> {
+    let by_place = |region: &SceneRegion| {
+        matches!(region, SceneRegion::Known(Region::Box { .. } | Region::Disc { .. } | Region::Edge { .. }))
+    };
+    let by_place = scene.roles.iter().enumerate().filter(|(_, entry)| by_place(&entry.region));
+    by_place
+        .map(|(k, entry)| {
+            let particles = layout.pick(scene, &format!("roles[{k}]"), &entry.region)?;
+            let places = particles.iter().map(|&i| layout.body.reference.get(i));
+            let ends = places.fold([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]], |[low, high], [x, y]| {
+                [[low[0].min(x), low[1].min(y)], [high[0].max(x), high[1].max(y)]]
+            });
+            Ok((format!("roles[{k}].region"), ends))
+        })
+        .collect()
+}
+
 /// What a finer body has others of, or more: particles with these ids, outermost ones, pushed ones.
 fn require_refinable(scene: &Scene, layout: &Layout) -> Result<(), SceneError> {
     const OR: &str = "write a smaller spacing, or ask for less";
     let refuse = |key: &str, what: &str, help: &str| {
         Err(scene.refuse(key, format!("the accuracy takes a finer body, {what}"), format!("{help}, {OR}")))
     };
-    let of_roles =
-        scene.roles.iter().enumerate().map(|(k, entry)| (format!("roles[{k}].region"), &entry.region));
-    let of_loads = scene.loads.iter().enumerate().filter_map(|(k, load)| {
-        let (Load::Outline { region, .. } | Load::Force { region, .. }) = load else { return None };
-        Some((format!("loads[{k}].region"), region))
-    });
     if let Some(k) = scene.loads.iter().position(|load| matches!(load, Load::Force { .. })) {
         return refuse(&format!("loads[{k}].force"), "in which it pushes more particles", "give a traction");
     }
-    for (key, region) in of_roles.chain(of_loads) {
+    for (key, region) in scene.regions() {
         match region {
             SceneRegion::Known(Region::Ids(_)) => {
                 return refuse(&key, "in which these ids are other particles", "pick particles by place");
             }
             SceneRegion::Outermost(side) if !layout.is_flat(*side) => {
-                return refuse(&key, "in which less of a curved side is outermost", "give the edge a depth");
+                return refuse(
+                    &key,
+                    "in which less of a side that is not straight is outermost",
+                    "pick pieces of the outline",
+                );
             }
             _ => {}
         }
