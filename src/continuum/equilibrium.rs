@@ -243,9 +243,10 @@ fn refuse_corotated(scene: &Scene, error: &CorotatedError) -> SceneError {
         CorotatedError::Solve(error) => return refuse(scene, error),
         CorotatedError::DoubleOnly => ("equilibrium.precision", "use \"f64\", or leave the precision out"),
         CorotatedError::Feedback => ("rule.feedback", "leave it out: it does not move the place of rest"),
-        CorotatedError::Unsettled { .. } => {
-            ("equilibrium", "load it less, or leave [equilibrium] out to step there")
-        }
+        CorotatedError::Unsettled { .. } => (
+            "equilibrium",
+            "load it less, add a small load in the direction in which it may buckle, or leave [equilibrium] out to step there",
+        ),
         CorotatedError::NotLinear(_) => ("rule", "leave [equilibrium] out to step"),
     };
     scene.refuse(key, error.to_string(), help)
