@@ -22,7 +22,7 @@ def generate_launch_description():
         DeclareLaunchArgument(
             "swarm",
             default_value=in_share("swarms", "square.toml"),
-            description="Swarm file: who flies, in what shape",
+            description="Swarm file: which robots fly, in what shape",
         ),
         DeclareLaunchArgument(
             "parameters",
