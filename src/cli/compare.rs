@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use flockform::continuum::run::StopReason;
 use flockform::export::comparison::{ComparisonReport, write_comparison};
-use flockform::export::{Signed, report};
+use flockform::export::{Signed, counted, report};
 use flockform::fem::Effort;
 use flockform::flock::rules::Rotation;
 use flockform::scene::Scene;
@@ -71,8 +71,8 @@ fn words(scene: &Scene, compared: &Compared) -> String {
         StopReason::Diverged(_) => "; the last good state is compared".to_owned(),
     };
     let way = match &outcome.solved {
-        Some(solved) => format!("{}, {} iterations", solved.solver, solved.iterations),
-        None => format!("{} steps", outcome.engine.step()),
+        Some(solved) => format!("{}, {}", solved.solver, counted(solved.iterations, "iteration")),
+        None => counted(outcome.engine.step(), "step"),
     };
     let nodes = compared.reference.solution.nodes();
     let mut words = format!(

@@ -16,6 +16,8 @@ use crate::material::stress::{self, Over, StressState};
 
 /// Part of the strain energy by which the work done on the way may differ from it.
 const MISSED_WORK: f64 = 0.05;
+/// Part of the loads that may be left on the followers of a body that is at rest \[1\].
+const UNBALANCED: f64 = 0.01;
 /// Strain of a body that has been unloaded again, but for rounding \[1\].
 const UNSTRAINED: f64 = 1e-7;
 /// Strain beyond which small rotations and strains are a caution \[1\].
@@ -229,15 +231,23 @@ impl Mechanics {
     pub fn cautions(&self, engine: &Engine) -> Vec<String> {
         let mut cautions = Vec::new();
         let is_material = matches!(engine.flock().rule.mean, Mean::Material { .. });
-        let is_small = is_material && rotation(engine) == Rotation::Small;
-        if is_small && (self.largest_strain > SMALL_STRAIN || self.largest_turn > SMALL_TURN) {
-            cautions.push(format!(
-                "strains of up to {:.0} % and turns of up to {:.0} degrees under rotation = \"small\", which is right \
-                 for small ones (10 %, 10 degrees): displacements and forces are proportional to the load, as they are \
-                 no more in a body that is bent so far; rotation = \"corotated\" follows the turns",
-                100.0 * self.largest_strain,
-                self.largest_turn.to_degrees()
-            ));
+        let is_strained = self.largest_strain > SMALL_STRAIN;
+        match rotation(engine) {
+            Rotation::Small if is_material && (is_strained || self.largest_turn > SMALL_TURN) => {
+                cautions.push(format!(
+                    "strains of up to {} and turns of up to {:.0} degrees under rotation = \"small\", which is right \
+                     for small ones (10 %, 10 degrees): displacements and forces are proportional to the load, as they are \
+                     no more in a body that is bent so far; rotation = \"corotated\" follows the turns",
+                    percent(self.largest_strain),
+                    self.largest_turn.to_degrees()
+                ));
+            }
+            Rotation::Corotated if is_material && is_strained => cautions.push(format!(
+                "strains of up to {} under rotation = \"corotated\", which follows turns of any size but is right for \
+                 small strains (10 %): stress stays proportional to strain, and forces act on undeformed lengths",
+                percent(self.largest_strain)
+            )),
+            _ => {}
         }
         cautions.extend(self.missed_work());
         if let Some(cells) = engine.cells().filter(|_| is_material) {
@@ -248,6 +258,13 @@ impl Mechanics {
         cautions
     }
 
+    /// The part of the loads, or without loads of the reactions, that the followers are not in balance with \[1\], if it is
+    /// too much for a body at rest.
+    pub fn short_of_rest(&self, engine: &Engine) -> Option<f64> {
+        let forces = Forces::of(engine).filter(|_| self.largest_strain > UNSTRAINED)?;
+        Some(forces.share_left(engine)).filter(|&left| left > UNBALANCED)
+    }
+
     /// The trapezoid rule misses work where forces are not linear between two equilibria.
     fn missed_work(&self) -> Option<String> {
         let done = self.work_done.map(|work| work.loads + work.supports)?;
@@ -256,11 +273,17 @@ impl Mechanics {
         (is_loaded && missed > MISSED_WORK && missed.is_finite()).then(|| {
             format!(
                 "the work done on the way, summed up by the trapezoid rule from one equilibrium to the next, differs by \
-                 {:.0} % from the strain energy, which holds: use more load_steps.increments",
-                100.0 * missed
+                 {} from the strain energy, which holds: use more load_steps.increments",
+                percent(missed)
             )
         })
     }
+}
+
+/// A share in percent, which may be beyond all bounds.
+pub fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    if percent < 1e4 { format!("{percent:.0} %") } else { format!("{percent:.1e} %") }
 }
 
 /// By the rule's own forces under small rotations, else from the cells.

@@ -7,12 +7,12 @@ use serde::{Deserialize, Serialize};
 use super::mechanics::Stresses;
 use super::pieces::CellNumbers;
 use crate::engine::Engine;
-use crate::flock::body::Body;
+use crate::flock::body::{Body, Cut};
 use crate::material::cells::Cells;
 use crate::material::place::Around;
 use crate::material::stress::StressState;
 use crate::ranks::Team;
-use crate::scene::{Scene, SceneError};
+use crate::scene::{BodySource, Scene, SceneError};
 
 /// Displacement and stress at a place of a body.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,6 +27,9 @@ pub struct AtPlace {
     pub von_mises: f64,
 }
 
+/// How far outside the body a place is that was rounded when it was written \[spacings\].
+const ROUNDING: f64 = 1e-3;
+
 /// The particles around each place of `record.places`; of those that another rank has, where each has a part of the body, none.
 ///
 /// # Errors
@@ -36,8 +39,13 @@ pub fn around(
     (body, cells): (&Body, Option<&Cells>),
     team: Option<&Team>,
 ) -> Result<Vec<Option<Around>>, SceneError> {
-    // An outline of chords may be that far from the shape.
-    let reach = scene.lattice.spacing();
+    let spacing = scene.lattice.spacing();
+    let rounding = ROUNDING * spacing;
+    // Chords and staircases may be that far within the shape.
+    let reach = |place| match &scene.body {
+        BodySource::Cut(Cut::Shape(shape)) if shape.contains(place, rounding) => spacing,
+        _ => rounding,
+    };
     let numbers = cells.map(|cells| CellNumbers::of(body, cells, team));
     let of = |(k, &place): (usize, &[f64; 2])| {
         let key = format!("record.places[{k}]");
@@ -55,10 +63,9 @@ pub fn around(
         let order = |a: &[u64; 2], b: &[u64; 2]| {
             f64::from_bits(a[0]).total_cmp(&f64::from_bits(b[0])).then(a[1].cmp(&b[1]))
         };
-        let nearest = ranks.into_iter().min_by(order).filter(|of| f64::from_bits(of[0]) <= reach);
+        let nearest = ranks.into_iter().min_by(order).filter(|of| f64::from_bits(of[0]) <= reach(place));
         let help = "give a place of the undeformed body";
-        let nearest =
-            nearest.ok_or_else(|| scene.refuse(&key, "is more than a spacing away from the body", help))?;
+        let nearest = nearest.ok_or_else(|| scene.refuse(&key, "is away from the body", help))?;
         Ok(own.filter(|_| found == nearest).map(|(around, ..)| around))
     };
     scene.record.places.iter().enumerate().map(of).collect()

@@ -9,7 +9,7 @@ use super::layout::Layout;
 use super::layout::refusals::refuse_pieces;
 use super::layout::regions::no_particle;
 use super::layout::roles::{ReferenceMotion, held_components};
-use super::parts::{Parting, agreed};
+use super::parts::{Parting, agreed, averages_dilatations};
 use super::pieces::require_connected;
 use super::{places, weights};
 use crate::engine::probes::ProbeSeries;
@@ -302,7 +302,15 @@ fn other_layout(
     }
     let other = lay_out(changed).map_err(|error| error.to_string())?;
     let is_same = other.body.reference == layout.body.reference && other.neighbours == layout.neighbours;
-    if is_same { Ok(Some(other)) } else { Err(OTHER_BODY.into()) }
+    if is_same {
+        return Ok(Some(other));
+    }
+    let why = if averages_dilatations(scene) == averages_dilatations(changed) {
+        ""
+    } else {
+        ": above a Poisson's ratio of 0.4 (2/3 in plane stress) dilatations are averaged over more of them"
+    };
+    Err(format!("{OTHER_BODY}{why}"))
 }
 
 /// Why keys do not change on the way.

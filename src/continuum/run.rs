@@ -10,7 +10,9 @@ use crate::engine::several::StepBatch;
 use crate::engine::shared::{Agreed, NotShared};
 use crate::engine::state::{EngineState, WrongState};
 use crate::flock::law::Weights;
+use crate::flock::role::Role;
 use crate::flock::rules::{FeedbackReference, Mean};
+use crate::geometry::point::{dot, minus};
 use crate::ranks::Team;
 use crate::scene::{Scene, SceneError, Stop};
 use crate::solve::equilibrium::Solved;
@@ -257,53 +259,77 @@ pub fn overflow(engine: &Engine) -> Option<Divergence> {
 }
 
 fn divergence(engine: &Engine, movement: &Movement, bound: f64) -> Option<Divergence> {
+    let (mut raise, mut too_far) = ("", "so far that energies overflow");
     let (particle, what) = if let Some(lost) = (!movement.is_finite).then(|| engine.first_lost()).flatten() {
         (lost, "has no finite position any more".to_owned())
     } else if movement.largest_displacement > bound {
         let (far, apart) = engine.farthest();
-        let why = if apart > FARTHEST {
-            "so far that energies overflow"
-        } else {
-            "more than stop.divergence_ratio allows"
-        };
-        (far, format!("is {apart:.3e} from its reference place, {why}"))
+        if apart <= FARTHEST {
+            (raise, too_far) = (", or raise stop.divergence_ratio", "more than stop.divergence_ratio allows");
+        }
+        (far, format!("is {apart:.3e} from its reference place, {too_far}"))
     } else {
         return None;
     };
-    Some(Divergence { step: engine.step(), particle, what, likely_cause: likely_cause(engine) })
+    // A body that is put to rest at once has not moved.
+    let is_swept = movement.largest_move > 0.0 || !movement.is_finite;
+    let likely_cause = is_swept.then(|| cause_in_sweep(engine)).flatten().unwrap_or_else(|| {
+        let cause = match engine.whole_load() {
+            Some(_) => "the loads move the body that far; check them and the stiffness of the material",
+            None => "a leader leaves the body behind; check the leaders' motions",
+        };
+        format!("{cause}{raise}")
+    });
+    Some(Divergence { step: engine.step(), particle, what, likely_cause })
 }
 
-/// The likeliest reason, from what the rule contains.
-fn likely_cause(engine: &Engine) -> String {
+/// The likeliest reason for a sweep to grow, from what the rule contains; `None` where the sweep is stable.
+fn cause_in_sweep(engine: &Engine) -> Option<String> {
     let rule = engine.flock().rule;
     let damping = engine.update().damping;
     let overshoot = rule.feedback.map(|f| (f.factor, f.reference));
     if let Some((factor, FeedbackReference::Initial)) = overshoot {
-        return format!(
+        return Some(format!(
             "feedback factor {factor}: the sweep grows once |1 + factor| times its spectral radius exceeds 1; bring the factor closer to 0"
-        );
+        ));
     }
     if let Some((factor, FeedbackReference::Previous)) = overshoot {
-        return format!("over-relaxation by 1 + {factor} in a synchronous update; bring the factor below 0");
+        return Some(format!(
+            "over-relaxation by 1 + {factor} in a synchronous update; bring the factor below 0"
+        ));
     }
     if damping > 1.0 {
-        return format!("damping = {damping} overshoots every target; use at most 1");
+        return Some(format!("damping = {damping} overshoots every target; use at most 1"));
     }
     if let Some(poisson) = rule.poisson {
-        return format!("the Poisson term adds K = {} at every step; use a smaller K", poisson.k);
+        return Some(format!("the Poisson term adds K = {} at every step; use a smaller K", poisson.k));
     }
-    if matches!(rule.mean, Mean::Material { .. }) && engine.update().order == Order::Synchronous {
-        return format!(
-            "a material swept synchronously with damping = {damping} lets its shortest waves grow; leave update.damping out"
-        );
+    let is_synchronous = engine.update().order == Order::Synchronous;
+    if matches!(rule.mean, Mean::Material { .. }) {
+        return (is_synchronous && overshoots(engine)).then(|| {
+            format!(
+                "a material swept synchronously with damping = {damping:.3} lets its shortest waves grow; use a smaller \
+                 update.damping, or leave it out"
+            )
+        });
     }
-    if matches!(rule.mean, Mean::Distance { .. }) && engine.update().order == Order::Synchronous {
-        return "weights that grow with distance are marginal in a synchronous update; use update.order = \"sequential\" or update.damping = 0.5".into();
+    if matches!(rule.mean, Mean::Distance { .. }) && is_synchronous {
+        return Some("weights that grow with distance are marginal in a synchronous update; use update.order = \"sequential\" or update.damping = 0.5".into());
     }
-    if matches!(engine.flock().weights, Weights::Scalar(_)) {
-        return "weights of both signs; give weights that are not negative".into();
-    }
-    "a leader leaves the body behind; check the leaders' motions, or raise stop.divergence_ratio".into()
+    let is_weighted = matches!(engine.flock().weights, Weights::Scalar(_));
+    is_weighted.then(|| "weights of both signs; give weights that are not negative".into())
+}
+
+/// Whether the followers' next moves go against their last ones: waves that grow from step to step change their sign at
+/// each, and outweigh all else in the end.
+fn overshoots(engine: &Engine) -> bool {
+    let (present, previous) = (engine.present(), engine.previous());
+    let followers = engine.body().owned().filter(|&i| engine.roles()[i] == Role::Follower);
+    let along = |i: usize| {
+        let here = present.get(i);
+        [dot(minus(engine.flock().target(i, present), here), minus(here, previous.get(i)))]
+    };
+    engine.sum_over([0.0], followers.map(|i| (i, along(i))))[0] < 0.0
 }
 
 #[cfg(test)]

@@ -178,6 +178,26 @@ impl Forces {
     /// The largest force that is left on a follower, along components that are free \[force\]: none where the body is
     /// at rest.
     pub(crate) fn largest_left(&self, engine: &Engine) -> f64 {
+        let left = self.left_on_followers(engine).into_iter().map(|(_, left)| left);
+        let [largest] = engine.largest_of_parts([left.fold(0.0, f64::max)]);
+        largest
+    }
+
+    /// What is left on all followers over the loads, or, without loads, over the reactions, sizes added up \[1\].
+    pub(crate) fn share_left(&self, engine: &Engine) -> f64 {
+        let sum = |forces: &Vectors| {
+            let size = |[x, y]: [f64; 2]| [f64::hypot(x, y)];
+            engine.sum_over([0.0], engine.body().owned().map(|i| (i, size(forces.get(i)))))[0]
+        };
+        let left = self.left_on_followers(engine).into_iter().map(|(i, left)| (i, [left]));
+        let [left] = engine.sum_over([0.0], left);
+        let loads = sum(&self.loads);
+        let whole = if loads > 0.0 { loads } else { sum(&self.supports(engine)) };
+        left / whole
+    }
+
+    /// Followers, and the size of the force that is left on each along components that are free \[force\].
+    fn left_on_followers(&self, engine: &Engine) -> Vec<(usize, f64)> {
         let mut free = vec![[true; 2]; engine.roles().len()];
         for Held { particle, axes } in held(engine).into_iter().flatten() {
             (0..2).filter(|&axis| axes[axis]).for_each(|axis| free[particle][axis] = false);
@@ -188,8 +208,7 @@ impl Forces {
             f64::hypot(x, y)
         };
         let followers = engine.body().owned().filter(|&i| engine.roles()[i] == Role::Follower);
-        let [largest] = engine.largest_of_parts([followers.map(left).fold(0.0, f64::max)]);
-        largest
+        followers.map(|i| (i, left(i))).collect()
     }
 }
 

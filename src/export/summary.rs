@@ -11,7 +11,7 @@ use super::error::{ExportError, write_file};
 use super::{OutputFolder, bonds, largest_strain};
 use crate::continuum::late;
 use crate::continuum::layout::regions::uneven_sides;
-use crate::continuum::mechanics::{Mechanics, Peak, Stresses};
+use crate::continuum::mechanics::{Mechanics, Peak, Stresses, percent};
 use crate::continuum::places::{AtPlace, at_places};
 use crate::continuum::report::dead_pressure;
 use crate::continuum::run::{Outcome, StopReason};
@@ -69,6 +69,9 @@ const FILE: &str = "summary.json";
 /// Part of the forces on a body that may be left on a follower of one at rest \[1\].
 const AT_REST: f64 = 1e-6;
 
+/// Ratio of the stiffnesses of a body's materials beyond which rounding may leave too little of the softest's \[1\].
+const MOST_CONTRAST: f64 = 1e8;
+
 /// Times of the parts of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Timings {
@@ -109,6 +112,9 @@ pub struct Summary {
     /// Cautions about the result.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub cautions: Vec<String>,
+    /// Whether the run ended since nothing moved farther than the tolerance, far from balance.
+    #[serde(skip)]
+    pub is_short_of_rest: bool,
     /// Bonds that are broken at the end.
     pub broken_bonds: BrokenBonds,
     /// How long the parts of the run took.
@@ -227,6 +233,17 @@ impl Summary {
         let engine = &outcome.engine;
         let [pe1, pe2] = engine.energies();
         let largest_strain = largest_strain(engine);
+        let is_slow = outcome.reason == StopReason::Equilibrium && outcome.solved.is_none();
+        let settled = measured.as_ref().filter(|_| is_slow);
+        let left = settled.and_then(|settled| settled.mechanics.short_of_rest(engine));
+        let short_of_rest = left.map(|left| {
+            let of = if engine.whole_load().is_some() { "loads" } else { "reactions" };
+            format!(
+                "nothing moves farther in a step than stop.tolerance, but {} of the {of} are not in balance yet: lower \
+                 stop.tolerance",
+                percent(left)
+            )
+        });
         Self {
             name: scene.name.clone(),
             title: scene.raw.title.clone(),
@@ -241,7 +258,12 @@ impl Summary {
             share_swept: outcome.solved.is_none().then(|| outcome.engine.activity().share_computed()),
             equilibrium: outcome.solved.as_ref().map(Equilibrium::of),
             energies: Energies { pe1, pe2, largest_strain },
-            cautions: cautions(scene, engine, measured.as_ref()),
+            is_short_of_rest: short_of_rest.is_some(),
+            cautions: [short_of_rest, of_contrast(scene, &outcome.reason)]
+                .into_iter()
+                .flatten()
+                .chain(cautions(scene, engine, measured.as_ref()))
+                .collect(),
             mechanics: measured,
             broken_bonds: broken_bonds(&outcome.engine),
             timings: Seconds {
@@ -251,6 +273,11 @@ impl Summary {
             },
             scene: scene.raw.clone(),
         }
+    }
+
+    /// How the run ended, the end of a sentence.
+    pub fn end(&self, reason: &StopReason) -> String {
+        if self.is_short_of_rest { "no move beyond stop.tolerance".to_owned() } else { reason.to_string() }
     }
 
     /// Writes `summary.json`.
@@ -268,6 +295,20 @@ fn cautions(scene: &Scene, engine: &Engine, measured: Option<&Measured>) -> Vec<
         .chain(late::cautions(scene))
         .chain(measured.map(of_forces).into_iter().flatten())
         .collect()
+}
+
+/// The likely cause of a solve that ended short of its tolerance, where a body is of several materials.
+fn of_contrast(scene: &Scene, reason: &StopReason) -> Option<String> {
+    let all = scene.material.iter().chain(scene.inclusions.iter().map(|part| &part.material));
+    let stiffness = all.map(|elastic| elastic.stiffness()[(2, 2)]);
+    let range = stiffness.fold([f64::INFINITY, 0.0], |[low, high], own| [own.min(low), own.max(high)]);
+    let contrast = range[1] / range[0];
+    (*reason == StopReason::Unsettled && contrast > MOST_CONTRAST).then(|| {
+        format!(
+            "the stiffest material is {contrast:.0e} times as stiff as the softest, which likely keeps the solver from \
+             its tolerance: bring the stiffnesses closer together"
+        )
+    })
 }
 
 impl Measured {
@@ -345,6 +386,11 @@ impl fmt::Display for Measured {
         }
         Ok(())
     }
+}
+
+/// So many of them.
+pub fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
 /// Five digits.

@@ -10,7 +10,7 @@ use super::csv::write;
 use super::error::ExportError;
 use super::figures::chart::{Axis, Chart, Landmark, Series, Style, draw};
 use super::figures::{self, INK, SERIES};
-use super::summary::write_signed;
+use super::summary::{counted, write_signed};
 use crate::solve::equilibrium::Solver;
 use crate::study::trade::{Outcome, Point, RuleChoice, Study};
 
@@ -106,7 +106,8 @@ fn series<'a>(
 
 fn label(point: &Point) -> String {
     let (error, seconds) = (point.error.unwrap_or(f64::NAN), point.seconds.unwrap_or(f64::NAN));
-    let iterations = point.iterations.map_or_else(String::new, |count| format!(", {count} iterations"));
+    let iterations =
+        point.iterations.map_or_else(String::new, |count| format!(", {}", counted(count, "iteration")));
     format!(
         "{}\n{} particles{iterations}\nerror {:.3} %, {:.3} ms",
         point.setting,

@@ -126,6 +126,90 @@ fn the_clamp_of_the_loaded_beam_returns_force_and_moment_of_the_load_and_the_ene
 }
 
 #[test]
+fn strains_that_are_not_small_are_a_caution_under_large_rotations_too() {
+    let corotated = BAR.replace("kind = \"material\"", "kind = \"material\", rotation = \"corotated\"");
+    let [well, too_far] = ["18e9", "42e9"].map(|traction| PULL.replace("50e3", traction));
+    let (_, said) = run(&[&corotated, &well, "[equilibrium]\n"], &["--figures", "none"], 0);
+    assert!(!said.contains("caution"), "{said}");
+    let (_, said) = run(&[&corotated, &too_far, "[equilibrium]\n"], &["--figures", "none"], 0);
+    assert!(said.contains("caution: strains of up to 20 % under rotation = \"corotated\""), "{said}");
+    let beyond_all = PULL.replace("50e3", "1e200");
+    let (_, said) = run(&[BAR, &beyond_all, SOLVED], &["--figures", "none"], 1);
+    assert!(said.contains("caution: strains of up to 4.8e190 %"), "{said}");
+}
+
+#[test]
+fn a_body_that_moves_slowly_is_not_said_to_be_in_equilibrium() {
+    let swept = |tolerance: &str| {
+        let stop = format!(
+            "[stop]\nsteps = 100000\ntolerance = {tolerance}\n[load_steps]\nramp = {{ steps = 500 }}\n"
+        );
+        let (folder, said) = run(&[BAR, PULL, &stop], &["--figures", "none"], 0);
+        (summary(folder.path())["cautions"].clone(), said)
+    };
+    let (cautions, said) = swept("1e-9");
+    let caution = cautions[0].as_str().expect("a caution");
+    assert!(
+        caution.contains("of the loads are not in balance") && caution.contains("stop.tolerance"),
+        "{caution}"
+    );
+    assert!(said.contains("no move beyond stop.tolerance") && !said.contains("in equilibrium"), "{said}");
+    let (cautions, said) = swept("1e-14");
+    assert!(cautions.is_null() && said.contains("in equilibrium"), "{said}");
+}
+
+#[test]
+fn a_place_outside_the_shape_is_refused_and_one_between_it_and_its_cells_is_not() {
+    let hole = "shape = { kind = \"rectangle\", min = [0.0, 0.0], max = [4.0, 2.0] }\n\
+                holes = [{ kind = \"disc\", centre = [2.0, 1.0], radius = 0.6 }]";
+    let (shape, _) = hole.split_once('\n').expect("two lines");
+    let pierced = BAR.replace(shape, hole).replace("spacing = 0.5", "spacing = 0.2");
+    let staircase = pierced.replace("holes =", "outline = \"lattice\"\nholes =");
+    let at = |body: &str, place: &str, code| {
+        let places = format!("[record]\nplaces = [{place}]\n");
+        run(&[body, PULL, SOLVED, &places], &["--figures", "none"], code).1
+    };
+    for (body, place) in
+        [(BAR, "[4.4, 1.0]"), (&pierced, "[4.0, 2.01]"), (&pierced, "[2.5, 1.0]"), (&staircase, "[2.5, 1.0]")]
+    {
+        let said = at(body, place, 2);
+        assert!(said.contains("record.places[0]") && said.contains("away from the body"), "{place}: {said}");
+    }
+    // On the hole's edge, which chords cut off, as far as it is written; and where the staircase leaves cells out.
+    for (body, place) in [(BAR, "[4.0, 1.0]"), (&pierced, "[2.4242, 1.4242]"), (&staircase, "[2.45, 1.45]")] {
+        assert!(at(body, place, 0).contains("moved by"), "{place}");
+    }
+}
+
+#[test]
+fn a_solve_that_rounding_ends_names_stiffnesses_that_are_far_apart() {
+    let stiff = "[[body.inclusions]]\nshape = { kind = \"disc\", centre = [2.0, 1.0], radius = 0.6 }\n\
+                 material = { kind = \"isotropic\", young = 210e21, poisson = 0.0, thickness = 1e-3 }\n";
+    let fine = BAR.replace("spacing = 0.5", "spacing = 0.2");
+    let (_, said) = run(&[&fine, stiff, PULL, "[equilibrium]\n"], &["--figures", "none"], 1);
+    assert!(said.contains("short of its tolerance"), "{said}");
+    assert!(said.contains("the stiffest material is 1e12 times as stiff"), "{said}");
+}
+
+#[test]
+fn regions_and_changes_that_cannot_be_name_the_reason() {
+    let refused = |more: &str| run(&[BAR, more], &["--figures", "none"], 2).1;
+    let loaded = |region: &str| {
+        refused(&format!(
+            "[[loads]]\nkind = \"pressure\"\nregion = {{ kind = \"outline\", {region} }}\npressure = 1.0\n"
+        ))
+    };
+    let said = loaded("hole = 1");
+    assert!(said.contains("the body has no holes\n  help: leave it out"), "{said}");
+    let said = loaded("angles = [0.0, 90.0]");
+    assert!(said.contains("region.angles = [0.0, 90.0]: there are no arcs"), "{said}");
+    let set =
+        |keys: &str| refused(&format!("[[actions]]\nat = 5\nwhat = {{ kind = \"set\", keys = [{keys}] }}\n"));
+    let said = set("\"material.poisson=0.7\"");
+    assert!(said.contains("above a Poisson's ratio of 0.4 (2/3 in plane stress)"), "{said}");
+}
+
+#[test]
 fn a_bar_in_uniaxial_tension_has_the_stress_of_its_load_everywhere() {
     let place = "[record]\nplaces = [[2.1, 1.3]]\n";
     let (folder, said) = run(&[BAR, PULL, SOLVED, place], &["--figures", "none"], 0);

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use flockform::continuum::run::{Outcome, StopReason};
 use flockform::export::report::page;
-use flockform::export::{Measured, Summary};
+use flockform::export::{Measured, Summary, counted};
 use flockform::scene::Scene;
 
 pub fn closing_words(scene: &Scene, outcome: &Outcome, summary: &Summary, elapsed: Duration) -> String {
@@ -18,11 +18,12 @@ pub fn closing_words(scene: &Scene, outcome: &Outcome, summary: &Summary, elapse
         _ => "",
     };
     let mut words = format!(
-        "{}: {} {}, residual {:.2e}, {how}{kept} ({:.2} s)\n",
+        "{}: {} {}, residual {:.2e}, {}{kept} ({:.2} s)\n",
         scene.name,
         scene.counts(),
         engine.step(),
         outcome.residual,
+        summary.end(how),
         elapsed.as_secs_f64()
     );
     if let Some(solved) = &outcome.solved {
@@ -32,10 +33,10 @@ pub fn closing_words(scene: &Scene, outcome: &Outcome, summary: &Summary, elapse
             format!(" (what rounding leaves: displacements are known to about {error:.0e} of themselves)")
         });
         words += &format!(
-            "{}, {}: {} iterations to a residual force of {:.1e} of the load{rounding}, {}\n",
+            "{}, {}: {} to a residual force of {:.1e} of the load{rounding}, {}\n",
             solved.solver,
             solved.why,
-            solved.iterations,
+            counted(solved.iterations, "iteration"),
             solved.residuals.last().copied().unwrap_or_default(),
             phases.join(", ")
         );

@@ -249,19 +249,26 @@ pub(in crate::continuum) fn no_particle(id: usize, body: &Body) -> String {
     format!("there is no particle {id}: ids run from {low} to {high}")
 }
 
-/// Refuses a hole or a piece that the outline does not have.
+/// Refuses a hole or a piece that the outline does not have, and angles where there are no arcs.
 fn check_pieces(scene: &Scene, key: &str, region: &SceneRegion, outline: &Outline) -> Result<(), SceneError> {
-    let SceneRegion::Outline(Selection::Pieces { ring, pieces, .. }) = region else { return Ok(()) };
+    let SceneRegion::Outline(Selection::Pieces { ring, pieces, angles }) = region else { return Ok(()) };
     let rings = outline.rings();
     if *ring >= rings.len() {
-        let message = match rings.len() - 1 {
-            0 => "the body has no holes".to_owned(),
-            holes => format!("there is no hole {ring}: the body has {holes}"),
+        let (message, help) = match rings.len() - 1 {
+            0 => ("the body has no holes".to_owned(), "leave it out, or give the body holes by body.holes"),
+            holes => (format!("there is no hole {ring}: the body has {holes}"), "count body.holes from 1"),
         };
-        return Err(scene.refuse(&format!("{key}.hole"), message, "count body.holes from 1"));
+        return Err(scene.refuse(&format!("{key}.hole"), message, help));
     }
     let known: HashSet<usize> = rings[*ring].iter().map(|piece| piece.number).collect();
+    let is_asked = |number: usize| pieces.is_empty() || pieces.contains(&number);
+    let has_arcs = rings[*ring].iter().any(|piece| is_asked(piece.number) && piece.arc.is_some());
     match pieces.iter().position(|number| !known.contains(number)) {
+        None if angles.is_some() && !has_arcs => {
+            let message = "there are no arcs in this part of the outline, whose angles these could be";
+            let help = "leave angles out, and pick by pieces, by hole or between two points";
+            Err(scene.refuse(&format!("{key}.angles"), message, help))
+        }
         None => Ok(()),
         Some(k) => {
             let most = rings[*ring].iter().map(|piece| piece.number + 1).max().unwrap_or(0);

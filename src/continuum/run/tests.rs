@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 
 use super::*;
 use crate::continuum::digest::digest;
+use crate::continuum::equilibrium::solve_equilibrium;
 use crate::scene::{Scene, bundled};
 
 fn scene(name: &str, sets: &[&str]) -> Scene {
@@ -96,6 +97,41 @@ fn a_rule_that_is_changed_on_the_way_diverges_at_the_same_step_however_often_it_
     assert_eq!(each.2, some.2);
     assert_eq!(each.2, all.2);
     assert!(each == some && each == all);
+}
+
+#[test]
+fn a_sweep_that_is_stable_is_not_blamed_for_a_load_or_a_leader() {
+    let cause = |sets: &[&str]| {
+        let material = [
+            "frame=none",
+            "neighbours={kind=\"cells\"}",
+            "material={kind=\"isotropic\",young=1000.0,poisson=0.33}",
+            "rule={mean={kind=\"material\"}}",
+            "record={}",
+            "stop.steps=5000",
+        ];
+        let scene = scene("tension", &[&material, sets].concat());
+        let plan = plan(&scene);
+        let outcome = match &scene.equilibrium {
+            Some(asked) => solve_equilibrium(&scene, &asked.request, plan).expect("has one"),
+            None => run(plan, &mut |_, _| ControlFlow::Continue(())),
+        };
+        let StopReason::Diverged(divergence) = outcome.reason else { panic!("{sets:?}: {}", outcome.reason) };
+        divergence.likely_cause
+    };
+    let held = "roles=[{region={kind=\"edge\",side=\"left\"},role=\"clamped\"}]";
+    let load = |force: &str| format!("loads=[{{kind=\"body\",force=[0.0,{force}]}}]");
+    let [small, large, largest] = ["-1e-3", "-1e6", "-1e300"].map(load);
+    for given in [&[][..], &["update.damping=0.5"]] {
+        let cause = cause(&[&[held, &large], given].concat());
+        assert!(cause.starts_with("the loads") && cause.ends_with("raise stop.divergence_ratio"), "{cause}");
+    }
+    let too_large = cause(&[held, &small, "update.damping=1.0"]);
+    assert!(too_large.contains("damping = 1.000 lets its shortest waves grow"), "{too_large}");
+    let led = cause(&["roles[1].motion.per_step=[1e3,0.0]"]);
+    assert!(led.starts_with("a leader"), "{led}");
+    let solved = cause(&[held, &largest, "equilibrium={solver=\"direct\"}"]);
+    assert!(solved.starts_with("the loads") && !solved.contains("divergence_ratio"), "{solved}");
 }
 
 #[test]

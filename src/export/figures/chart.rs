@@ -3,6 +3,7 @@
 
 use serde::Serialize;
 
+use super::super::counted;
 use super::axes::Axes;
 use super::heading::{Heading, Key, Mark};
 use super::page;
@@ -342,7 +343,7 @@ pub fn residuals(residuals: &[f64]) -> Chart {
 pub fn draw_residuals(title: &str, solver: &str, values: &[f64]) -> String {
     let mut chart = residuals(values);
     chart.title = title.to_owned();
-    chart.note = format!("residual of {solver}, {} iterations", values.len().saturating_sub(1));
+    chart.note = format!("residual of {solver}, {}", counted(values.len().saturating_sub(1), "iteration"));
     chart.y.quantity = "residual force over load".into();
     chart.series[0].name = solver.to_owned();
     draw(&chart)

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use super::super::OutputFolder;
 use super::super::comparison::ComparisonReport;
 use super::super::error::ExportError;
+use super::super::{OutputFolder, counted};
 use super::encoded;
 use super::frames::{Channel, Frames};
 use super::page::{Page, Table, number, scene_text};
@@ -122,8 +122,8 @@ fn on_particles(compared: &Compared, of_cells: &[f64]) -> Vec<f64> {
 fn facts(scene: &Scene, report: &ComparisonReport) -> Vec<(String, String)> {
     let rule = &report.rule;
     let way = match (rule.solver, rule.iterations) {
-        (Some(solver), Some(iterations)) => format!("{solver}, {iterations} iterations"),
-        _ => format!("{} steps", rule.steps),
+        (Some(solver), Some(iterations)) => format!("{solver}, {}", counted(iterations, "iteration")),
+        _ => counted(rule.steps, "step"),
     };
     vec![
         ("Rule".into(), format!("by {way}: {}", rule.stop_reason)),

@@ -404,7 +404,7 @@ pub fn write(
     let page = Page {
         title: scene.raw.title.clone(),
         command: format!("flockform run {}", scene.name),
-        verdict: Some(verdict(outcome)),
+        verdict: Some(verdict(outcome, summary)),
         moments: Vec::new(),
         note: note(&stage.animation, outcome, is_solved_at_once(scene, outcome)),
         stages: vec![stage],
@@ -417,10 +417,12 @@ pub fn write(
     page.write(folder)
 }
 
-fn verdict(outcome: &Outcome) -> (bool, String) {
+fn verdict(outcome: &Outcome, summary: &Summary) -> (bool, String) {
     let (reason, step) = (&outcome.reason, outcome.engine.step());
     let words = match reason {
-        StopReason::Equilibrium if outcome.solved.is_none() => format!("{reason} at step {step}"),
+        StopReason::Equilibrium if outcome.solved.is_none() => {
+            format!("{} at step {step}", summary.end(reason))
+        }
         StopReason::Interrupted => format!("{reason} at step {step}"),
         StopReason::Steps => format!("all {step} steps done"),
         StopReason::Stuck(_) => format!("in equilibrium at increment {step}, but {reason}"),

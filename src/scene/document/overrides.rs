@@ -145,7 +145,10 @@ fn descend<'a>(parent: &'a mut Node, segment: &Segment, blank: Node) -> Result<&
             }
             let length = items.len();
             items.get_mut(index).ok_or_else(|| {
-                format!("the list has {length} elements, so an index is at most {length}, which appends one")
+                let elements = if length == 1 { "element" } else { "elements" };
+                format!(
+                    "the list has {length} {elements}, so an index is at most {length}, which appends one"
+                )
             })
         }
         _ => Err("a table is entered by a key, not by an index".to_owned()),
@@ -207,6 +210,8 @@ mod tests {
         let expected = "--set roles[5].speed=1: roles[5]: the list has 2 elements, \
                         so an index is at most 2, which appends one";
         assert_eq!(refusal("roles[5].speed=1"), expected);
+        let one = overridden(&["m=[7]", "m[5]=1"]).unwrap_err();
+        assert!(one.contains("the list has 1 element, so"), "{one}");
     }
 
     #[test]
