@@ -27,7 +27,7 @@ impl Deviation {
     pub fn of(plan: &Plan) -> Option<Self> {
         let (cells, outline) = (plan.setup.cells.as_ref()?, plan.outline.as_ref()?);
         let whole = outline.area();
-        let shapes: Vec<f64> = cells.shapes.iter().map(|shape| area(shape)).collect();
+        let shapes: Vec<f64> = cells.shapes.iter().map(area).collect();
         let covered: f64 = cells.kind.iter().map(|&kind| shapes[kind as usize]).sum();
         let distance = farthest(plan, cells, outline);
         Some(Self { area: covered / whole - 1.0, distance, distance_rel: distance / whole.sqrt() })

@@ -65,7 +65,7 @@ pub fn around(
         };
         let nearest = ranks.into_iter().min_by(order).filter(|of| f64::from_bits(of[0]) <= reach(place));
         let help = "give a place of the undeformed body";
-        let nearest = nearest.ok_or_else(|| scene.refuse(&key, "is away from the body", help))?;
+        let nearest = nearest.ok_or_else(|| scene.refuse(&key, "is outside the body", help))?;
         Ok(own.filter(|_| found == nearest).map(|(around, ..)| around))
     };
     scene.record.places.iter().enumerate().map(of).collect()

@@ -127,7 +127,7 @@ impl PlanReport {
 fn inclusions(scene: &Scene, plan: &Plan) -> Option<String> {
     let cells = plan.setup.cells.as_ref().filter(|cells| !cells.inclusions.is_empty())?;
     let mut areas = vec![0.0; cells.inclusions.len() + 1];
-    let of_kind: Vec<f64> = cells.shapes.iter().map(|shape| area(shape)).collect();
+    let of_kind: Vec<f64> = cells.shapes.iter().map(area).collect();
     cells.kind.iter().for_each(|&k| areas[cells.region[k as usize] as usize] += of_kind[k as usize]);
     let whole: f64 = areas.iter().sum();
     let shares: Vec<String> =

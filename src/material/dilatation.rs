@@ -53,7 +53,7 @@ impl<'a> Patches<'a> {
                 *on_edge |= around.windows(2).any(|pair| region(&pair[0]) != region(&pair[1]));
             }
         }
-        let areas = cells.shapes.iter().map(|shape| area(shape)).collect();
+        let areas = cells.shapes.iter().map(area).collect();
         Some(Self { cells, incidence, on_edge, areas, lambda })
     }
 

@@ -101,7 +101,7 @@ fn region_means(
 ) -> impl Iterator<Item = Option<StressState>> {
     let elastic = *cells.material_of_region(region, elastic);
     let mut sums = vec![([0.0; 3], 0.0); particles];
-    let areas: Vec<f64> = cells.shapes.iter().map(|shape| area(shape)).collect();
+    let areas: Vec<f64> = cells.shapes.iter().map(area).collect();
     for (cell, corners) in cells.iter().enumerate().filter(|&(cell, _)| counts(cell)) {
         let weight = areas[cells.kind[cell] as usize];
         for &corner in corners {

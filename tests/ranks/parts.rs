@@ -437,8 +437,8 @@ fn a_large_material_in_parts_too() {
 #[test]
 fn loads_on_a_body_in_parts_are_those_on_one_laid_out_as_a_whole() {
     let grid = "body={shape={kind=\"grid\",columns=24,rows=9}}";
-    // Of the places one may be outside, one is on a side of two cells, one at a particle.
-    let probes = "record={probes=[1,30,61,100],places=[[16.3,5.8],[2.1,5.5],[20.9,5.0],[12.0,6.0],[7.0,7.3],[15.0,2.5]]}";
+    // Of the places one is on a side of two cells, one at a particle.
+    let probes = "record={probes=[1,30,61,100],places=[[16.3,5.8],[2.1,5.5],[20.9,5.0],[12.0,6.0],[7.0,6.3],[15.0,2.5]]}";
     let released = "roles[1]={region={kind=\"edge\",side=\"top\"},role=\"clamped\",from=30}";
     let pressure = "{kind=\"pressure\",region={kind=\"outline\",hole=1},pressure=9.0}";
     let traction = "{kind=\"traction\",region={kind=\"edge\",side=\"top\",depth=4.0},traction=[2.0,7.0],\
@@ -536,7 +536,7 @@ fn a_material_in_parts_is_refused_for_what_it_is_refused_for_as_a_whole() {
         ("no particle of the body lies", &[&slanted, &nowhere]),
         ("no part of the outline lies", &[&slanted, &off]),
         ("there is no particle 5000", &[&slanted, "record={probes=[5000]}"]),
-        ("a spacing away from the body", &[&slanted, "record={places=[[12.0,4.0],[50.4,4.3]]}"]),
+        ("is outside the body", &[&slanted, "record={places=[[12.0,4.0],[50.4,4.3]]}"]),
         ("like a hinge", &[&hinge[..]]),
         ("like a hinge", &[&hinge, &weight, &at("")]),
         ("no leader holds", &[&weight, "roles=[]"]),
@@ -549,7 +549,7 @@ fn a_material_in_parts_is_refused_for_what_it_is_refused_for_as_a_whole() {
         ("no neighbours", &[few]),
         ("no chain of cells", &[apart, far]),
         ("are not connected", &[apart]),
-        ("a spacing away from the body", &["record={places=[[12.0,8.0],[8.4,4.3]]}"]),
+        ("is outside the body", &["record={places=[[12.0,8.0],[8.4,4.3]]}"]),
     ] {
         assert_refused_the_same(&plate(PLATE, &[&["record.probes=[]"], sets].concat()), what);
     }

@@ -232,8 +232,11 @@ fn words(solved: &Solved, accuracy: f64, part: f64) -> String {
     )
 }
 
-/// From where to where particles take roles by place, by key \[length\].
-fn extents_of_roles(scene: &Scene, layout: &Layout) -> Result<Vec<(String, [[f64; 2]; 2])>, SceneError> {
+/// A key, and from where to where the particles are that it picks \[length\].
+type Extent = (String, [[f64; 2]; 2]);
+
+/// The roles that particles take by place.
+fn extents_of_roles(scene: &Scene, layout: &Layout) -> Result<Vec<Extent>, SceneError> {
     let by_place = |region: &SceneRegion| {
         matches!(region, SceneRegion::Known(Region::Box { .. } | Region::Disc { .. } | Region::Edge { .. }))
     };
