@@ -47,7 +47,7 @@ fn places_that_a_scene_names_are_told_beside_the_truth_s() {
     let output = flockform(&["compare", "cook", "--set", "record.places=[[0.0, 50.0]]"], folder.path());
     assert_eq!(output.status.code(), Some(2));
     let said = text(&output.stderr);
-    assert!(said.contains("record.places[0]") && said.contains("away from the body"), "{said}");
+    assert!(said.contains("record.places[0]") && said.contains("outside the body"), "{said}");
 }
 
 #[test]
