@@ -173,7 +173,7 @@ fn a_place_outside_the_shape_is_refused_and_one_between_it_and_its_cells_is_not(
         [(BAR, "[4.4, 1.0]"), (&pierced, "[4.0, 2.01]"), (&pierced, "[2.5, 1.0]"), (&staircase, "[2.5, 1.0]")]
     {
         let said = at(body, place, 2);
-        assert!(said.contains("record.places[0]") && said.contains("away from the body"), "{place}: {said}");
+        assert!(said.contains("record.places[0]") && said.contains("outside the body"), "{place}: {said}");
     }
     // On the hole's edge, which chords cut off, as far as it is written; and where the staircase leaves cells out.
     for (body, place) in [(BAR, "[4.0, 1.0]"), (&pierced, "[2.4242, 1.4242]"), (&staircase, "[2.45, 1.45]")] {
