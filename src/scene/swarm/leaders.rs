@@ -94,7 +94,8 @@ fn program(
             let number = raw.manoeuvres.iter().position(|manoeuvre| manoeuvre.name == *name);
             Program::Manoeuvre(number.ok_or_else(|| {
                 let known: Vec<&str> = raw.manoeuvres.iter().map(|m| m.name.as_str()).collect();
-                let message = format!("there is no manoeuvre `{name}`; there are: {}", known.join(", "));
+                let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+                let message = format!("there is no manoeuvre `{name}`; there are: {known}");
                 refuse(&format!("{key}.program.name"), message, "add it as [[manoeuvres]]")
             })?)
         }

@@ -109,25 +109,23 @@ impl Accelerations {
 }
 
 impl AccelerationReport {
-    /// In words; `number` writes accelerations.
+    /// In words; `number` writes accelerations. A way may be cut by several things at once, and a unicycle that stops to turn is
+    /// cut by none.
     pub fn words(&self, number: impl Fn(f64) -> String) -> String {
         let worst = self.worst.as_ref().map_or(String::new(), |moment| format!(": {moment}"));
         let largest = format!("{} m/s^2{worst}", number(self.largest));
         let limit = number(self.limit);
         if self.exceeded == 0 {
-            return format!("{largest}; the limit of {limit} was kept");
+            return format!("{largest}; robots without a fault kept the limit of {limit}");
         }
         let counts = [self.for_robots, self.for_obstacles, self.for_fence];
         let reasons = counts.iter().zip(REASONS).filter(|(count, _)| **count > 0);
-        let reasons: Vec<String> = reasons.map(|(count, (_, name))| format!("{count} of {name}")).collect();
-        let clear = if reasons.is_empty() {
-            String::new()
-        } else {
-            format!(", to keep clear {}", reasons.join(", "))
-        };
+        let reasons: Vec<String> =
+            reasons.map(|(count, (_, name))| format!("by {name} in {count}")).collect();
+        let cut = if reasons.is_empty() { String::new() } else { format!(", cut {}", reasons.join(", ")) };
         format!(
-            "{largest}; above the limit of {limit} in {} periods of {} robots{clear}",
-            self.exceeded, self.robots
+            "{largest}; robots without a fault ({} of them) were above the limit of {limit} in {} steps of a period{cut}",
+            self.robots, self.exceeded
         )
     }
 }

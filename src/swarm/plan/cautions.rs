@@ -43,6 +43,7 @@ pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
         (!raw.flight.start.is_empty())
             .then(|| outside(flight, "have their places in the formation", &|m| formation.places.get(m)))
             .flatten(),
+        near_at_the_start(flight, raw),
         led_outside(flight),
         in_solids(flight),
     ];
@@ -134,6 +135,21 @@ fn outside(flight: &Flight, which: &str, place: &dyn Fn(usize) -> [f64; 2]) -> O
     let names = formation.named(|m| !filter.is_fenced_in(place(m), formation.radii[m] - ROUNDING))?;
     Some(format!(
         "these robots {which} outside limits.geofence, in whole or in part: {names}; widen it, or move them"
+    ))
+}
+
+/// Robots that begin nearer to each other than the clearance, which nothing keeps until they have moved apart.
+fn near_at_the_start(flight: &Flight, raw: &RawSwarm) -> Option<String> {
+    let clearance = raw.limits.clearance?;
+    let (robots, formation) = (flight.fleet().robots(), flight.control().formation());
+    let is_near = |a: usize, b: usize| {
+        let apart = distance(robots[a].position, robots[b].position);
+        apart - formation.radii[a] - formation.radii[b] < clearance - ROUNDING
+    };
+    let is_beside_another = |m: usize| (0..robots.len()).any(|other| other != m && is_near(m, other));
+    let names = formation.named(is_beside_another)?;
+    Some(format!(
+        "these robots start nearer to another than limits.clearance: {names}; move them, or lower it"
     ))
 }
 

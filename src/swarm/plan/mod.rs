@@ -177,7 +177,11 @@ impl SwarmPlan {
             },
             speed: speed(swarm, formation, map.as_ref(), delay),
             exactness: Exactness::of(swarm, formation),
-            not_predicted: convergence.is_none().then(|| not_linear.unwrap_or("the rule is not linear")),
+            not_predicted: convergence.is_none().then(|| match not_linear {
+                _ if leaders == formation.count() => "every robot leads",
+                Some(why) => why,
+                None => "the rule is not linear",
+            }),
             convergence,
             cautions: Vec::new(),
         };

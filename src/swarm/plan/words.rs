@@ -26,7 +26,8 @@ impl fmt::Display for SwarmPlan {
         )?;
         let free =
             self.free_space.map_or(String::new(), |free| format!(", {free:.4} m between the nearest rims"));
-        line("formation", format!("places {spacing:.4} m apart{free}, {:.2} neighbours", self.neighbours))?;
+        let apart = if *robots > 1 { format!("places {spacing:.4} m apart{free}, ") } else { String::new() };
+        line("formation", format!("{apart}{:.2} neighbours", self.neighbours))?;
         line("loop", format!("a target every {period_s} s, at most {sweeps} sweeps of the rule in each"))?;
         match self.convergence {
             Some(Convergence { factor, half_life_s }) => {

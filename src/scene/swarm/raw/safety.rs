@@ -11,7 +11,8 @@ pub struct RawLimits {
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub speed: Option<f64>,
     /// Robots of the model double-integrator keep it always. The others put clearance, speed and fence first: where one comes
-    /// upon another, or upon an obstacle, too fast, it is exceeded, and the report of a flight says how often [m/s^2].
+    /// upon another, or upon an obstacle, too fast, or stops to turn, it is exceeded, and the report of a flight says how
+    /// often [m/s^2].
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub acceleration: Option<f64>,
     /// Free space kept between the rims of two robots, and of a robot and an obstacle [m]. Without it
