@@ -190,6 +190,13 @@ fn what_is_doubtful_is_a_caution_before_the_flight() {
         let cautions = square(more);
         assert!(cautions.iter().any(|caution| caution.contains(expected)), "{more:?}: {cautions:?}");
     }
+    let near =
+        "[limits]\nspeed = 1.0\nclearance = 0.4\n[flight]\nstart = [{ robot = \"b\", place = [0.3, 0.0] }]\n";
+    let cautions = plan_of(&parse(&format!("{PAIR}{near}")).expect("valid"));
+    assert!(
+        cautions.iter().any(|one| one.contains("start nearer to another than limits.clearance: `a`, `b`")),
+        "{cautions:?}"
+    );
     let silent = "[limits]\nclearance = 0.2\n[flight]\nfaults = [{ robot = \"b\", at = 1.0, what = { kind = \"silent\" } }]\n";
     let cautions = plan_of(&parse(&format!("{PAIR}{silent}")).expect("valid"));
     assert!(cautions.iter().any(|one| one.contains("how far `b` goes once it is not heard")), "{cautions:?}");
