@@ -85,6 +85,10 @@ impl<'a> Recorder<'a> {
     /// For a checkpoint.
     pub fn kept(&mut self, engine: &Engine) -> Recorded<'_> {
         self.receive_probes(engine);
+        if self.keeps_frames() {
+            // A run that was just resumed has not yet looked at a step, and still has the frames of before.
+            RunRecorder::open(&mut self.animation, &mut self.animation_state, engine);
+        }
         Recorded {
             snapshots: &self.snapshots,
             probes: &self.probes,
