@@ -213,3 +213,32 @@ fn load_every(scene: &Scene) -> Option<usize> {
         LoadSteps::Stepped { every, .. } => Some(*every),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use flockform::continuum::run::run;
+    use flockform::scene::bundled::bundled;
+
+    use super::*;
+
+    #[test]
+    fn a_recorder_that_has_not_yet_looked_at_a_step_keeps_the_frames_of_before() {
+        let scene = bundled("tension").expect("bundled").load(&[]).expect("valid");
+        let plan = || Plan::new(&scene).expect("can be laid out");
+        let recorder =
+            || Recorder::new(&scene, &plan(), None, None, (Outputs::ALL, false)).expect("writes nothing");
+        let mut first = recorder();
+        let outcome = run(plan(), &mut |engine, _| {
+            first.step(engine);
+            ControlFlow::Continue(())
+        });
+        let state = first.kept(&outcome.engine).animation.map(RunRecorder::animation_state);
+        let saved = serde_json::to_string(&state).expect("written");
+        let mut resumed = recorder();
+        resumed.animation_state = serde_json::from_str(&saved).expect("read");
+        let kept = resumed.kept(&outcome.engine).animation.map(RunRecorder::animation_state);
+        assert!(state.is_some() && kept == state);
+    }
+}
