@@ -406,32 +406,6 @@ impl Corotated<'_> {
             None => Ok(whole(own?).of_part(part.clone())),
         }
     }
-
-    /// Whether the energy has a minimum here: whether forces without any symmetry are borne.
-    fn is_stable(&self, locals: &[Option<Local>]) -> Result<bool, CorotatedError> {
-        let force = |(i, local): (usize, &Option<Local>)| {
-            let free = self.free(i).map(|free| free && local.is_some());
-            let of_axis = |axis: usize| {
-                let share = (2 * self.body.index(i) + axis) as f64 * 0.618_033_988_749_895;
-                if free[axis] { share.fract() - 0.5 } else { 0.0 }
-            };
-            [0, 1].map(of_axis)
-        };
-        let forces = locals.iter().enumerate().map(force).collect();
-        let system = self.system(locals, [forces, Vectors::zeros(locals.len())]);
-        let solved = solve_linear(
-            &system.map_err(NotLinear::Operator)?,
-            &self.step,
-            self.part.as_ref().map(|part| &part.team),
-        );
-        match solved {
-            Ok(_) => Ok(true),
-            Err(SolveError::NotPositive { .. } | SolveError::Diverged { .. } | SolveError::Loose { .. }) => {
-                Ok(false)
-            }
-            Err(error) => Err(error.into()),
-        }
-    }
 }
 
 /// Newton's method along the way.
@@ -524,7 +498,7 @@ impl Newton<'_> {
         let is_far = rule.any(!turns.iter().zip(&locals).all(near));
         // An iteration sees of a system what its right-hand side has in it; a factorisation sees all.
         let is_seen = self.last_step <= NEAR && (is_rounding || rule.step.solver == DIRECT);
-        let is_taken = is_settled && !is_far && (is_seen || rule.is_stable(&locals)?);
+        let is_taken = is_settled && !is_far && (is_seen || self.is_stable(&locals)?);
         Ok(is_taken.then_some(u))
     }
 
@@ -535,19 +509,49 @@ impl Newton<'_> {
         (locals, left): (&[Option<Local>], Vectors),
         led: Vectors,
     ) -> Result<(), CorotatedError> {
-        let begin = Stopwatch::start();
         let rule = self.rule;
-        let system = rule.system(locals, [left, led]).map_err(NotLinear::Operator)?;
-        let assembled = begin.elapsed();
-        let solved = solve_linear(&system, &rule.step, rule.part.as_ref().map(|part| &part.team))?;
-        self.times[0] += assembled + solved.phases[0].1;
-        self.times[1] += solved.phases[1].1;
+        let solved = self.solved(locals, [left, led])?;
         self.last_step = rule.norm(&solved.displacement) / rule.norm(u).max(f64::MIN_POSITIVE);
         for (i, by) in solved.displacement.iter().enumerate() {
             let at = u.get(i);
             u.set(i, [at[0] + by[0], at[1] + by[1]]);
         }
         Ok(())
+    }
+
+    /// Whether the energy has a minimum here: whether forces without any symmetry are borne.
+    fn is_stable(&mut self, locals: &[Option<Local>]) -> Result<bool, CorotatedError> {
+        let rule = self.rule;
+        let force = |(i, local): (usize, &Option<Local>)| {
+            let free = rule.free(i).map(|free| free && local.is_some());
+            let of_axis = |axis: usize| {
+                let share = (2 * rule.body.index(i) + axis) as f64 * 0.618_033_988_749_895;
+                if free[axis] { share.fract() - 0.5 } else { 0.0 }
+            };
+            [0, 1].map(of_axis)
+        };
+        let forces = locals.iter().enumerate().map(force).collect();
+        match self.solved(locals, [forces, Vectors::zeros(locals.len())]) {
+            Err(CorotatedError::Solve(
+                SolveError::NotPositive { .. } | SolveError::Diverged { .. } | SolveError::Loose { .. },
+            )) => Ok(false),
+            solved => solved.map(|_| true),
+        }
+    }
+
+    /// The linear system at these forces and stiffnesses, solved for the forces that are left and the leaders' moves.
+    fn solved(
+        &mut self,
+        locals: &[Option<Local>],
+        left_and_led: [Vectors; 2],
+    ) -> Result<Solved, CorotatedError> {
+        let (begin, rule) = (Stopwatch::start(), self.rule);
+        let system = rule.system(locals, left_and_led).map_err(NotLinear::Operator)?;
+        let assembled = begin.elapsed();
+        let solved = solve_linear(&system, &rule.step, rule.part.as_ref().map(|part| &part.team))?;
+        self.times[0] += assembled + solved.phases[0].1;
+        self.times[1] += solved.phases[1].1;
+        Ok(solved)
     }
 }
 

@@ -32,7 +32,7 @@ const SINGLE: &str = "{ kind = \"integrator\" }";
 const UNICYCLE: &str = "{ kind = \"unicycle\", turn_rate = 120.0 }";
 const IDEAL: &str = "{ kind = \"ideal\" }";
 
-/// Poses of now, and robots that do as they are told.
+/// Poses of now, and robots that follow their targets.
 const SOUND: Series = Series { model: DOUBLE, delay: 0, noise: 0.0, loss: 0.0, faults: &[] };
 
 /// What stops a robot, or its poses.
@@ -126,7 +126,7 @@ fn swarm_file(random: &mut Pcg64Mcg, series: &Series) -> (String, f64) {
             text,
             "[[flight.faults]]\nrobot = \"r{robot}\"\nat = {at}\nwhat = {{ kind = \"{kind}\" }}\n"
         );
-        // One that takes time to brake is not covered when it goes on from where nobody took it to be.
+        // One that takes time to brake is not covered when it goes on from elsewhere than it was taken to be.
         if series.model != DOUBLE && draw(0.0, 1.0) < 0.3 {
             let _ = writeln!(text, "until = {}", at + draw(0.2, 2.0));
         }

@@ -32,16 +32,19 @@ fn band(outline: &Outline, side: Side, depth: f64, grain: f64) -> Vec<Portion> {
 /// The warnings about regions that hold what is outermost on a side that is not straight, and less of it the narrower the
 /// spacing is.
 pub(crate) fn uneven_sides(scene: &Scene) -> Vec<String> {
-    let outline = match &scene.body {
-        BodySource::Cut(Cut::Shape(shape)) if scene.is_fitted => Outline::of_shape(shape).ok(),
+    let BodySource::Cut(Cut::Shape(shape)) = &scene.body else { return Vec::new() };
+    let outermost = scene.regions().filter_map(|(key, region)| match region {
+        SceneRegion::Outermost(side) => Some((key, *side)),
         _ => None,
-    };
+    });
+    let outermost: Vec<(String, Side)> = outermost.collect();
+    // An outline of many corners takes a while.
+    if !scene.is_fitted || outermost.is_empty() {
+        return Vec::new();
+    }
+    let Ok(outline) = Outline::of_shape(shape) else { return Vec::new() };
     let grain = 1e-9 * scene.lattice.spacing();
-    let is_uneven = |region: &SceneRegion| match (region, &outline) {
-        (SceneRegion::Outermost(side), Some(outline)) => band(outline, *side, 0.0, grain).is_empty(),
-        _ => false,
-    };
-    let uneven = scene.regions().filter(|(_, region)| is_uneven(region));
+    let uneven = outermost.into_iter().filter(|(_, side)| band(&outline, *side, 0.0, grain).is_empty());
     uneven
         .map(|(key, _)| {
             format!(

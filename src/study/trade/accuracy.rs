@@ -13,6 +13,7 @@ use crate::continuum::run::Outcome;
 use crate::flock::region::Region;
 use crate::flock::role::Role;
 use crate::flock::vectors::distance;
+use crate::geometry::point::bounds;
 use crate::scene::raw::RawMean;
 use crate::scene::{Load, Scene, SceneError, SceneRegion};
 use crate::solve::equilibrium::{Precision, Request};
@@ -244,11 +245,8 @@ fn extents_of_roles(scene: &Scene, layout: &Layout) -> Result<Vec<Extent>, Scene
     by_place
         .map(|(k, entry)| {
             let particles = layout.pick(scene, &format!("roles[{k}]"), &entry.region)?;
-            let places = particles.iter().map(|&i| layout.body.reference.get(i));
-            let ends = places.fold([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]], |[low, high], [x, y]| {
-                [[low[0].min(x), low[1].min(y)], [high[0].max(x), high[1].max(y)]]
-            });
-            Ok((format!("roles[{k}].region"), ends))
+            let (low, high) = bounds(particles.iter().map(|&i| layout.body.reference.get(i)));
+            Ok((format!("roles[{k}].region"), [low, high]))
         })
         .collect()
 }
