@@ -6,10 +6,11 @@ use std::process::ExitCode;
 use clap::Args;
 use flockform::continuum::run::StopReason;
 use flockform::export::comparison::{ComparisonReport, write_comparison};
-use flockform::export::{Signed, counted, report};
+use flockform::export::{Signed, report};
 use flockform::fem::Effort;
 use flockform::flock::rules::Rotation;
 use flockform::scene::Scene;
+use flockform::scene::text::counted;
 use flockform::study::compare::run::{Compared, compare as compare_scene};
 use flockform::study::trade::{Chosen, choose};
 

@@ -7,6 +7,7 @@ use clap::Args;
 use clap::builder::{PathBufValueParser, PossibleValuesParser, TypedValueParser};
 use flockform::export::OutputFolder;
 use flockform::export::film::{Film, FilmColour, FilmError, FilmFile, FilmFormat, Finished};
+use flockform::scene::text::counted;
 
 use super::output::{OutputArguments, ReportArguments};
 use super::progress::Progress;
@@ -155,5 +156,6 @@ impl Finish<'_> {
 
 fn in_words(film: &Finished) -> String {
     let Finished { path, frames, size: [width, height], encoder } = film;
-    format!("film of {frames} frames, {width} x {height} pixels ({encoder}), in {}\n", path.display())
+    let frames = counted(*frames, "frame");
+    format!("film of {frames}, {width} x {height} pixels ({encoder}), in {}\n", path.display())
 }

@@ -308,7 +308,7 @@ impl Refusal {
             matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
         };
         match self {
-            Refusal::Export(ExportError::Io { source, .. })
+            Refusal::Export(ExportError::Io { source, .. } | ExportError::Unmakeable { source, .. })
             | Refusal::Film(FilmError::Io { source, .. })
             | Refusal::Record(RecordError::Io { source, .. })
             | Refusal::NewFile { source, .. } => is_full(source),

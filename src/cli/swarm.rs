@@ -16,6 +16,7 @@ use flockform::record::flight::FlightMessages;
 use flockform::record::{About, Shared};
 use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
+use flockform::scene::text::counted;
 use flockform::swarm::control::Control;
 use flockform::swarm::flight::{Flight, FlightReport, Record, Sample, fly_with_observer};
 use flockform::swarm::plan::cautions;
@@ -163,13 +164,16 @@ pub fn fly_recorded(
 fn words(report: &FlightReport, seconds: f64, kept: &Path) -> String {
     let FlightReport { leaders, leaders_at_start, .. } = *report;
     let at_end = if leaders == leaders_at_start { String::new() } else { format!(" ({leaders} at the end)") };
+    let faster = report.seconds / seconds.max(1e-9);
     let mut words = format!(
-        "{}: {} robots ({}), {leaders_at_start} leaders{at_end}, {:.2} s flown in {seconds:.2} s ({:.0} times real time)\n",
+        "{}: {} ({}), {}{at_end}, {:.2} s flown in {seconds:.2} s ({:.*} times real time)\n",
         report.name,
-        report.robots,
+        counted(report.robots, "robot"),
         report.model,
+        counted(leaders_at_start, "leader"),
         report.seconds,
-        report.seconds / seconds.max(1e-9)
+        usize::from(faster < 10.0),
+        faster,
     );
     let mut line = |name: &str, value: String| words += &format!("  {name:<33}  {value}\n");
     report.facts(number).into_iter().for_each(|(name, value)| line(name, value));

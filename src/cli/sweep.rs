@@ -14,6 +14,7 @@ use flockform::export::sweep::{
 use flockform::export::{ExportError, OutputFolder, unfinished};
 use flockform::scene::Scene;
 use flockform::scene::document::is_lost_to;
+use flockform::scene::text::counted;
 use flockform::study::design::{Design, Sampling, Shard};
 use runs::Runs;
 
@@ -189,10 +190,7 @@ impl Sweep {
     fn ends(&self) -> String {
         let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
         self.rows.values().for_each(|row| *counts.entry(&row.stop_reason).or_default() += 1);
-        let runs = match self.rows.len() {
-            1 => "1 run".to_owned(),
-            count => format!("{count} runs"),
-        };
+        let runs = counted(self.rows.len(), "run");
         let counts: Vec<(&str, usize)> = counts.into_iter().collect();
         if let [(reason, count)] = counts[..] {
             let all = if count == 1 { "" } else { "all " };

@@ -110,8 +110,9 @@ impl Stresses {
         of_whole_cells(engine, (cells, &torn), elastic, displacement)
     }
 
-    /// At the engine's present places.
+    /// At the engine's present places; of a scene without a material nothing is laid out to find that it has none.
     pub fn at_present(engine: &Engine) -> Option<Self> {
+        engine.cells()?;
         let here = |index: u32| Some(engine.body().exact_particle(index as usize)? as u32);
         let pairs = engine.breaks().iter().filter_map(|one| Some([here(one.pair[0])?, here(one.pair[1])?]));
         Self::of(engine, engine.step(), &engine.displacements(), &pairs.collect::<Vec<_>>())

@@ -38,6 +38,9 @@ pub fn at_least(scene: &Scene) -> f64 {
 /// Bytes of each particle: positions (twice), reference, roles, sites, and where its neighbours begin.
 const EACH: usize = 3 * 16 + 3 + 8 + 4;
 
+/// Bytes of a leader: where it was, by which change it is led, and lists that it is in.
+const LED: usize = 48 + 3 * 8;
+
 /// Bytes of an engine: positions (twice), reference, roles, sites, neighbour lists and what the scene adds to them.
 pub fn stepped(plan: &Plan) -> usize {
     let (count, bonds) = (plan.count(), neighbour_entries(plan));
@@ -47,7 +50,9 @@ pub fn stepped(plan: &Plan) -> usize {
         .cells
         .as_ref()
         .map_or(0, |cells| 4 * (cells.starts.len() + cells.index.len() + cells.count()));
+    let leaders = plan.setup.roles.iter().filter(|&&role| role == Role::Leader).count();
     count * EACH
+        + leaders * LED
         + bonds * 4
         + lists_of_the_sweep(plan)
         + match &plan.setup.flock.weights {

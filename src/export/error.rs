@@ -34,6 +34,14 @@ pub enum ExportError {
     /// A path that ends in no name.
     #[error("{:?} does not name a folder that could be made: give --out a name", .0.display().to_string())]
     Unnamed(PathBuf),
+    /// A folder of outputs that the system does not let stand where it is asked for.
+    #[error("cannot create {}: {source}\n  help: give --out a name in a folder that can be written to", .out.display())]
+    Unmakeable {
+        /// Where it is asked for.
+        out: PathBuf,
+        /// The error of the system.
+        source: io::Error,
+    },
     /// An unfinished run that would be discarded.
     #[error(
         "{} holds a {command} that was not finished: continue it with `flockform {command} --resume {}`, discard it with --force, or give another --out",

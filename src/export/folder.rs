@@ -56,7 +56,8 @@ impl OutputFolder {
         let above = out.ancestors().skip(1).take_while(|folder| !folder.exists());
         let made: Vec<PathBuf> = above.map(Path::to_owned).collect();
         if let Some(parent) = made.first() {
-            fs::create_dir_all(parent).map_err(ExportError::io("create", parent))?;
+            fs::create_dir_all(parent)
+                .map_err(|source| ExportError::Unmakeable { out: parent.clone(), source })?;
         }
         let (partial, lock) = claim(&out)?;
         let files = Arc::new(Written::open(&partial).map_err(ExportError::io("create", &partial))?);
@@ -300,7 +301,7 @@ fn claim(out: &Path) -> Result<(PathBuf, Option<File>), ExportError> {
         let is_new = match fs::create_dir(&path) {
             Ok(()) => true,
             Err(error) if error.kind() == ErrorKind::AlreadyExists => false,
-            Err(error) => return Err(ExportError::io("create", &path)(error)),
+            Err(source) => return Err(ExportError::Unmakeable { out: out.to_owned(), source }),
         };
         match lock(&path) {
             Locked::Busy => return Err(ExportError::Busy(path)),

@@ -102,7 +102,6 @@ use figures::{Formats, Subject};
 pub use folder::{OutputFolder, unfinished};
 pub use summary::{
     BrokenBonds, Counts, Energies, Equilibrium, FirstBreak, Measured, Seconds, Signed, Summary, Timings,
-    counted,
 };
 pub use vtk::{VtkSeries, write_piece};
 

@@ -388,11 +388,6 @@ impl fmt::Display for Measured {
     }
 }
 
-/// So many of them.
-pub fn counted(count: usize, what: &str) -> String {
-    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
-}
-
 /// Five digits.
 fn short(value: f64) -> String {
     let text = format!("{value:.4e}");

@@ -10,7 +10,8 @@ use super::csv::write;
 use super::error::ExportError;
 use super::figures::chart::{Axis, Chart, Landmark, Series, Style, draw};
 use super::figures::{self, INK, SERIES};
-use super::summary::{counted, write_signed};
+use super::summary::write_signed;
+use crate::scene::text::counted;
 use crate::solve::equilibrium::Solver;
 use crate::study::trade::{Outcome, Point, RuleChoice, Study};
 

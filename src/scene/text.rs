@@ -10,6 +10,11 @@ const MOST_BYTES: u64 = 1 << 30;
 /// No word is suggested for one longer than this.
 const LONGEST_MISSPELLING: usize = 64;
 
+/// So many of them, as `1 robot` and `2 robots`.
+pub fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
 /// The text of a file of at most one GiB, so that a device without end, or another program's data, is refused and
 /// does not fill the memory.
 ///

@@ -1,6 +1,7 @@
 //! What goes wrong with robots in flight, row by row: what the rest of the formation does.
 
 use flockform::flock::vectors::distance;
+use flockform::scene::swarm::Swarm;
 use flockform::swarm::control::Control;
 use flockform::swarm::flight::Flight;
 use flockform::swarm::safety::Flags;
@@ -93,6 +94,44 @@ fn a_robot_is_lost_from_its_first_pose_on_or_if_none_comes() {
     assert_eq!(lost(&["flight.delay=3", "flight.jitter=2"]), 0);
     assert_eq!(lost(&["flight.delay=3", dead]), 1);
     assert_eq!(lost(&["flight.loss=1.0"]), 25);
+}
+
+/// A robot that is never heard stands where it starts, as far as is known: the others pass it.
+#[test]
+fn a_robot_that_is_never_heard_is_kept_clear_of() {
+    let four = "title = \"four\"\nradius = 0.2\nlinks = { kind = \"within\", radius = 5.0 }\n\
+                robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [0.0, 1.5] }, \
+                { name = \"c\", place = [0.75, 0.75] }, { name = \"d\", place = [0.75, 6.0] }]\n\
+                leaders = [{ robots = [\"a\", \"b\"], program = { kind = \"manoeuvre\", name = \"go\" } }]\n\
+                manoeuvres = [{ name = \"go\", legs = [{ seconds = 5.0, translate = [3.0, 0.0] }] }]\n\
+                limits = { speed = 1.5, acceleration = 1.0, clearance = 0.2 }\n\
+                flight = { start = [{ robot = \"d\", place = [2.0, 0.75] }] }\n";
+    for model in ["integrator", "double-integrator"] {
+        for what in ["dead", "silent", "not-a-number", "wrong-frame"] {
+            let fault =
+                format!("flight.faults=[{{ robot = \"d\", at = 0.0, what = {{ kind = \"{what}\" }} }}]");
+            let set = [fault, format!("flight.model={{ kind = \"{model}\" }}")];
+            let swarm = Swarm::parse("four", "four.toml", four, &set, None).unwrap_or_else(|e| panic!("{e}"));
+            let report = flown(&swarm).1;
+            let clearance = report.clearance.expect("four robots");
+            assert!((0.2 - 1e-9..0.5).contains(&clearance), "{model}, {what}: {clearance}");
+            assert_eq!((report.never_heard.as_slice(), report.most_lost), (&["d".to_owned()][..], 1));
+            assert!(report.programs_ended && report.per_robot[2].x > 3.0, "{model}, {what}: {report:?}");
+        }
+    }
+}
+
+#[test]
+fn programs_whose_leaders_are_never_heard_keep_no_bound() {
+    let fault = "flight.faults=[{ robot = \"robot_5\", at = 0.0, what = { kind = \"silent\" } }]";
+    let (_, report) = flown(&load_swarm("square", &[fault, "flight.bounds.affine_error=1.0"]));
+    let settled = report.facts(|x| x.to_string()).into_iter().find(|(name, _)| *name == "Settling time");
+    assert!(settled.is_some_and(|(_, words)| words.contains("never began")), "{report:?}");
+    let held: Vec<_> = report.bounds.iter().map(|one| (one.bound, one.found.is_some(), one.holds)).collect();
+    assert_eq!(
+        held,
+        [("affine_error", false, false), ("final_error", false, false), ("clearance", true, true)]
+    );
 }
 
 #[test]

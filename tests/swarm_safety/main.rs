@@ -131,6 +131,33 @@ fn a_robot_goes_around_a_wall() {
     }
 }
 
+/// It goes around the solid to the side on which its goal lies, if that hides the goal, and stays there.
+#[test]
+fn a_robot_stops_where_it_is_nearest_to_a_goal_that_it_cannot_reach() {
+    let square = vec![[-3.0, -3.0], [3.0, -3.0], [3.0, 3.0], [-3.0, 3.0]];
+    let fence = |speed: f64| Limits { geofence: Some(square.clone()), ..limits(speed, 0.1) };
+    let solids = [
+        (Obstacle::Disc { centre: [0.0, 0.0], radius: 1.0 }, [0.3, 0.4], [0.84, 1.12]),
+        (Obstacle::Disc { centre: [0.0, 0.0], radius: 1.0 }, [0.0, 1.2], [0.0, 1.4]),
+        (rectangle([-1.0, -1.0], [1.0, 1.0]), [0.5, 0.1], [1.4, 0.1]),
+        (rectangle([4.0, -1.0], [5.0, 1.0]), [4.0, 0.5], [2.7, 0.5]),
+        (rectangle([4.0, -1.0], [5.0, 1.0]), [4.0, 4.5], [2.7, 2.7]),
+    ];
+    for (solid, goal, nearest) in solids {
+        for start in [[-2.5, 0.0], [0.1, -2.5], [-2.0, 2.2]] {
+            for speed in [1.0, f64::INFINITY] {
+                let mut world = World::new(fence(speed), 0.3, std::slice::from_ref(&solid), &[[start, goal]]);
+                (0..600).for_each(|_| world.tick());
+                for _ in 0..30 {
+                    world.tick();
+                    let off = distance(world.present.get(0), nearest);
+                    assert!(off < 1e-6, "{start:?} to {goal:?} at {speed}: {:?}", world.present.get(0));
+                }
+            }
+        }
+    }
+}
+
 /// Each row of a scene's ticks: how much of the way to its target a robot goes.
 #[derive(Clone, Copy, PartialEq)]
 enum Pace {

@@ -15,6 +15,7 @@ use self::beam::{Parts, Plate};
 use super::machine::median;
 use super::quick_note;
 use crate::flock::vectors::Vectors;
+use crate::scene::text::counted;
 use crate::solve::equilibrium::{Choice, Request, SolveError, Solved, Solver, System, solve};
 use crate::solve::operator::OperatorError;
 
@@ -267,8 +268,7 @@ impl fmt::Display for Report {
         let iterations: Vec<String> =
             self.cases.iter().map(|case| format!("{} ({})", case.iterations, case.body)).collect();
         writeln!(f, "\nIterations to a residual of {RESIDUAL:e}: {}.", iterations.join(", "))?;
-        let threads = if self.threads == 1 { "thread" } else { "threads" };
-        writeln!(f, "Multigrid on {} {threads}, the factorisation on one.", self.threads)?;
+        writeln!(f, "Multigrid on {}, the factorisation on one.", counted(self.threads, "thread"))?;
         quick_note(self.quick, f)
     }
 }

@@ -5,6 +5,7 @@ use std::fmt;
 use super::super::machine::Bandwidth;
 use super::super::quick_note;
 use super::Report;
+use crate::scene::text::counted;
 
 const GIGA: f64 = 1e-9;
 
@@ -13,12 +14,12 @@ impl fmt::Display for Report {
         writeln!(f, "{}; {}", self.processor.as_deref().unwrap_or("a processor without name"), self.chosen)?;
         for triad in &self.triad {
             let Bandwidth { threads, counted_bytes_per_second, moved_bytes_per_second } = triad;
-            let (counted, moved) = (GIGA * counted_bytes_per_second, GIGA * moved_bytes_per_second);
+            let (sum, moved) = (GIGA * counted_bytes_per_second, GIGA * moved_bytes_per_second);
             writeln!(
                 f,
-                "triad, {}: {moved:.1} GB/s moved ({counted:.1} GB/s without write-allocate); \
+                "triad, {}: {moved:.1} GB/s moved ({sum:.1} GB/s without write-allocate); \
                  at 48 bytes an update the roofline is {:.3} G updates/s",
-                of_threads(*threads),
+                counted(*threads, "thread"),
                 moved / 48.0,
             )?;
         }
@@ -61,10 +62,6 @@ impl fmt::Display for Report {
         }
         quick_note(self.quick, f)
     }
-}
-
-fn of_threads(threads: usize) -> String {
-    format!("{threads} thread{}", if threads == 1 { "" } else { "s" })
 }
 
 /// Three figures and the unit that suits them.

@@ -5,8 +5,9 @@ use std::time::Duration;
 
 use flockform::continuum::run::{Outcome, StopReason};
 use flockform::export::report::page;
-use flockform::export::{Measured, Summary, counted};
+use flockform::export::{Measured, Summary};
 use flockform::scene::Scene;
+use flockform::scene::text::counted;
 
 pub fn closing_words(scene: &Scene, outcome: &Outcome, summary: &Summary, elapsed: Duration) -> String {
     let engine = &outcome.engine;

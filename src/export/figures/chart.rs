@@ -3,12 +3,12 @@
 
 use serde::Serialize;
 
-use super::super::counted;
 use super::axes::Axes;
 use super::heading::{Heading, Key, Mark};
 use super::page;
 use super::svg::{Anchor, INK, Path, Svg};
 use super::ticks::{Ticks, power_of_ten};
+use crate::scene::text::counted;
 
 const HEIGHT: f64 = 430.0;
 const PANEL_HEIGHT: f64 = 190.0;

@@ -11,6 +11,7 @@ use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::{RawCommandKind, RawObstacle};
+use crate::scene::text::counted;
 use crate::swarm::flight::{FlightReport, Record};
 
 const OBSTACLE: &str = "#6b7078";
@@ -25,7 +26,7 @@ const ROUND: usize = 48;
 /// The whole flight.
 pub fn flight(swarm: &Swarm, record: &Record, report: &FlightReport) -> String {
     let Some(last) = record.tracks.last() else { return String::new() };
-    let note = format!("{} robots, {:.1} s", report.robots, report.seconds);
+    let note = format!("{}, {:.1} s", counted(report.robots, "robot"), report.seconds);
     let moment = Moment { flown: record.tracks.len(), places: last, note, field: None };
     Map::new(swarm, record, report).draw(&moment)
 }

@@ -6,6 +6,7 @@ use crate::export::figures::flight_map::{Map, Moment};
 use crate::export::report::FlightRecorder;
 use crate::flock::vectors::Vectors;
 use crate::scene::swarm::Swarm;
+use crate::scene::text::counted;
 use crate::swarm::flight::{FlightReport, Record};
 
 /// Differences below this are rounding \[m\], \[1\]; of squares its square.
@@ -46,7 +47,7 @@ pub fn film<'a>(
         let time = recorder.time(frame);
         // The periods are whole, times are sums of them.
         let flown = record.times.partition_point(|&at| at <= time + 1e-9 * time.abs());
-        let note = format!("{} robots, {time:.1} s", report.robots);
+        let note = format!("{}, {time:.1} s", counted(report.robots, "robot"));
         map.draw(&Moment { flown, places: &places(frame), note, field })
     };
     Film { count, draw: Box::new(draw) }

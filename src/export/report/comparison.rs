@@ -2,15 +2,16 @@
 
 use std::path::PathBuf;
 
+use super::super::OutputFolder;
 use super::super::comparison::ComparisonReport;
 use super::super::error::ExportError;
-use super::super::{OutputFolder, counted};
 use super::encoded;
 use super::frames::{Channel, Frames};
 use super::page::{Page, Table, number, scene_text};
 use super::view::{Animation, Clock, Quantity, View};
 use crate::flock::vectors::Vectors;
 use crate::scene::Scene;
+use crate::scene::text::counted;
 use crate::scene::units::Units;
 use crate::study::compare::run::Compared;
 

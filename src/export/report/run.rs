@@ -29,6 +29,7 @@ use crate::material::cells::Cells;
 use crate::material::elastic::{Constants, Elastic, Plane};
 use crate::material::stress::StressState;
 use crate::scene::Scene;
+use crate::scene::text::counted;
 use crate::scene::units::Units;
 
 /// Up to so many particles everything has the bits from which the strains of a body that turns far are still
@@ -441,12 +442,13 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
         )
     } else {
         let (steps, counts) = (outcome.engine.step(), animation.clock.quantity);
+        let frames = counted(frames, "frame");
         let between =
             animation.times.get(1).zip(animation.times.first()).map_or(1.0, |(second, first)| second - first);
         match between as usize {
-            0 | 1 => format!("Every {counts} is shown: {frames} frames."),
+            0 | 1 => format!("Every {counts} is shown: {frames}."),
             every => format!(
-                "Of {steps} {counts}s one in {every} is shown, {frames} frames (a page keeps at most {MOST_FRAMES}, fewer of a body whose frames are large); bonds that broke in between show at the next."
+                "Of {steps} {counts}s one in {every} is shown, {frames} (a page keeps at most {MOST_FRAMES}, fewer of a body whose frames are large); bonds that broke in between show at the next."
             ),
         }
     };

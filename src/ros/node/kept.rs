@@ -7,7 +7,8 @@ use crate::ros::edge::lifecycle::State;
 use crate::ros::edge::parameters::Value;
 use crate::swarm::control::ControlSnapshot;
 
-/// A node's state. Poses are not in it: they come again, and those of before would be too old.
+/// A node's state. Poses are not in it: they come again, and those of before would be too old; robots of which none comes are
+/// where they were.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct NodeSnapshot {
     /// Label of its lifecycle's state.

@@ -4,6 +4,7 @@ use toml::de::DeValue;
 
 use crate::scene::document::problem::{Place, Problem};
 use crate::scene::document::{Content, MAX_DEPTH, Node, Origin, child_path, node};
+use crate::scene::text::counted;
 
 /// One step of a key path.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -145,10 +146,8 @@ fn descend<'a>(parent: &'a mut Node, segment: &Segment, blank: Node) -> Result<&
             }
             let length = items.len();
             items.get_mut(index).ok_or_else(|| {
-                let elements = if length == 1 { "element" } else { "elements" };
-                format!(
-                    "the list has {length} {elements}, so an index is at most {length}, which appends one"
-                )
+                let elements = counted(length, "element");
+                format!("the list has {elements}, so an index is at most {length}, which appends one")
             })
         }
         _ => Err("a table is entered by a key, not by an index".to_owned()),

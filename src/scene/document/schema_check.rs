@@ -8,7 +8,7 @@ use serde_json::{Map, Number, Value};
 use crate::scene::document::problem::{Problem, SceneError};
 use crate::scene::document::schema_rule::{OtherKeys, Rule, Variants, any_of, listed, one_of};
 use crate::scene::document::{Content, Document, Node, child_path, entry};
-use crate::scene::text::{nearest, renamed};
+use crate::scene::text::{counted, nearest, renamed};
 
 /// Branches of an untagged enum are tried out only this many enums deep, since the tries multiply.
 const NESTED_TRIALS: usize = 2;
@@ -339,7 +339,7 @@ fn conversion_help(node: &Node, rule: &Rule<'_>) -> Option<String> {
 
 /// The error of a count outside its two bounds, if it is outside.
 fn wrong_count(count: usize, bounds: [Option<usize>; 2], noun: &str) -> Option<String> {
-    let plural = |count: usize| format!("{count} {noun}{}", if count == 1 { "" } else { "s" });
+    let plural = |count: usize| counted(count, noun);
     match bounds {
         [Some(least), Some(most)] if least == most && count != least => {
             Some(format!("must have {}, not {count}", plural(least)))

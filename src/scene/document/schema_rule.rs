@@ -197,9 +197,10 @@ impl<'s> Rule<'s> {
         unit.map_or_else(String::new, |unit| format!(" [{unit}]"))
     }
 
-    /// The first line of the description.
-    pub(crate) fn summary(&self) -> Option<&'s str> {
-        self.text("description")?.lines().next()
+    /// The first line of the description, without the unit that [`Rule::describe`] has.
+    pub(crate) fn summary(&self) -> Option<String> {
+        let line = self.text("description")?.lines().next()?.trim_end_matches('.');
+        Some(line.strip_suffix(&self.unit_suffix()).unwrap_or(line).to_owned() + ".")
     }
 
     /// The range that numbers must lie in.

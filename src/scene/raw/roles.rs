@@ -152,7 +152,7 @@ pub enum RawQuantity {
 pub enum RawMotion {
     /// The same displacement every step.
     Velocity {
-        /// [length per step]
+        /// Way in each step [length per step].
         per_step: [f64; 2],
     },
     /// Displacements at given steps; the last one is held.
@@ -184,9 +184,9 @@ pub enum RawMotion {
     },
     /// To and fro.
     Sinusoid {
-        /// [length]
+        /// Largest displacement [length].
         amplitude: [f64; 2],
-        /// [step]
+        /// Time of one oscillation [step].
         #[schemars(extend("exclusiveMinimum" = 0))]
         period: f64,
         /// Part of a period by which the motion is ahead [1].
@@ -220,10 +220,10 @@ pub enum RawMotion {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawKeyframe {
-    /// [step]
+    /// When it is there [step].
     #[schemars(range(min = 1))]
     pub step: usize,
-    /// [length]
+    /// From its place in the body [length].
     pub displacement: [f64; 2],
 }
 

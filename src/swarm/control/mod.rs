@@ -52,6 +52,18 @@ pub struct ControlSnapshot {
     /// Periods that the programs have run.
     periods: u64,
     leads: Vec<Option<LeadSnapshot>>,
+    /// Where members were last known to be \[m\].
+    #[serde(default)]
+    places: Vec<[f64; 2]>,
+}
+
+/// The place that a member is taken to stand at before any pose of it is believed.
+#[derive(Clone, Copy)]
+struct Start {
+    /// \[m, world frame\]
+    place: [f64; 2],
+    /// Time for which it may have left it unheard \[s\].
+    age: f64,
 }
 
 /// The filter's input where there are tracks.
@@ -89,6 +101,7 @@ pub struct Control {
     begun: bool,
     /// Members whose poses this loop receives.
     listens: Vec<bool>,
+    starts: Vec<Start>,
     now: f64,
     present: Vectors,
     /// Velocities between the last two poses \[m/s\].
@@ -117,6 +130,8 @@ impl Control {
         let filter = setup::filter(swarm, &formation)?;
         let watch = setup::watch(swarm, &formation, filter.limits().speed);
         let brakes = filter.limits().brakes && filter.limits().acceleration.is_finite();
+        // A robot that gets no target stands.
+        let starts = formation.starts(swarm)?.iter().map(|place| Start { place, age: 0.0 }).collect();
         Ok(Self {
             watch: Watch::new(count, watch),
             tracks: vec![Track::default(); if brakes { count } else { 0 }],
@@ -132,6 +147,7 @@ impl Control {
             periods: 0,
             begun: false,
             listens: vec![true; count],
+            starts,
             now: 0.0,
             present: formation.places.clone(),
             velocity: Vectors::zeros(count),
@@ -307,6 +323,9 @@ impl Control {
             program_time: self.program_time(),
             periods: self.periods,
             leads: self.formation.kept_leads(),
+            places: (0..self.formation.count())
+                .map(|member| self.watch.place(member).unwrap_or(self.starts[member].place))
+                .collect(),
         }
     }
 
@@ -315,9 +334,17 @@ impl Control {
     pub fn restore(&mut self, kept: ControlSnapshot) {
         (self.run_before, self.run, self.periods) = (kept.program_time, 0, kept.periods);
         self.formation.restore(kept.leads, kept.periods);
+        let age = self.watch.limits().age_limit;
+        // They may have gone on to their last targets.
+        self.starts.iter_mut().zip(kept.places).for_each(|(start, place)| *start = Start { place, age });
         if kept.is_stopped {
             self.emergency_stop();
         }
+    }
+
+    /// Whether every leader that the loop listens to has been heard, so that the leaders' programs run.
+    pub fn has_begun(&self) -> bool {
+        self.begun
     }
 
     /// The limits that the filter enforces.
@@ -397,20 +424,27 @@ impl Control {
         self.watch.look(now);
         self.flags.fill(0);
         for member in 0..self.formation.count() {
-            let place = self.watch.place(member);
-            self.known[member] = place.is_some();
+            let known = self.watch.place(member);
+            self.known[member] = known.is_some();
             self.usable[member] = self.watch.health(member).is_usable();
             // Where a lost member has gone is unknown: an age beyond the limit carries no more information.
-            let age = self.watch.age(member, now).unwrap_or(f64::INFINITY);
-            self.ages[member] = if place.is_some() { age.min(self.watch.limits().age_limit) } else { 0.0 };
-            self.present.set(member, place.unwrap_or([f64::NAN; 2]));
+            let oldest = self.watch.limits().age_limit;
+            let (place, age) = match (known, self.starts[member]) {
+                (Some(place), _) => {
+                    (place, self.watch.age(member, now).map_or(oldest, |age| age.min(oldest)))
+                }
+                (None, _) if !self.listens[member] => ([f64::NAN; 2], 0.0),
+                (None, Start { place, age }) => (place, if self.serves[member] { age } else { oldest }),
+            };
+            self.ages[member] = age;
+            self.present.set(member, place);
         }
     }
 
     /// Estimates the present states of members that take time to brake, and where they may be if they do not follow their
-    /// targets: a lost one is where it was left to itself. The targets of a member of another node are not known here, and
-    /// none were sent to a place that is not of the member's own poses: there the last place counts, with its age, and
-    /// velocities that are older still.
+    /// targets: a lost one is where it was left to itself, one that was never heard nor sent anything is where it starts. The
+    /// targets of a member of another node are not known here, and none were sent to a place that is not of the member's own
+    /// poses: there the last place counts, with its age, and velocities that are older still.
     fn follow_tracks(&mut self, now: f64) {
         let dynamics = self.dynamics();
         let gains = Gains::of(dynamics.acceleration, self.period, self.filter.limits().deviation);
@@ -426,7 +460,8 @@ impl Control {
             } else {
                 present.set(member, self.present.get(member));
                 velocity.set(member, self.velocity.get(member));
-                ages[member] = 2.0 * self.ages[member] + self.period;
+                let stands = !self.known[member] && self.ages[member] == 0.0;
+                ages[member] = if stands { 0.0 } else { 2.0 * self.ages[member] + self.period };
                 stray.error = 0.0;
                 stray.places.clear();
             }

@@ -40,7 +40,7 @@ pub struct AccelerationReport {
     /// Largest change of a robot's velocity from one period to the next, over the period \[m/s^2\].
     pub largest: f64,
     /// The robot that had it, when and where.
-    pub worst: Option<Moment>,
+    pub worst: Moment,
     /// Periods of single robots in which it was above the limit.
     pub exceeded: usize,
     /// Robots that were above it at some time.
@@ -92,19 +92,20 @@ impl Accelerations {
         }
     }
 
-    /// With the robots by name.
-    pub fn report(&self, names: &[String]) -> AccelerationReport {
+    /// With the robots by name; `None` where none was ever without a fault.
+    pub fn report(&self, names: &[String]) -> Option<AccelerationReport> {
         let [for_robots, for_obstacles, for_fence] = self.for_reason;
-        AccelerationReport {
+        let largest = self.largest?;
+        Some(AccelerationReport {
             limit: self.limit,
-            largest: self.largest.map_or(0.0, |largest| largest.value),
-            worst: self.largest.map(|largest| largest.named(names)),
+            largest: largest.value,
+            worst: largest.named(names),
             exceeded: self.exceeded,
             robots: self.by_robot.iter().filter(|&&times| times > 0).count(),
             for_robots,
             for_obstacles,
             for_fence,
-        }
+        })
     }
 }
 
@@ -112,8 +113,7 @@ impl AccelerationReport {
     /// In words; `number` writes accelerations. A way may be cut by several things at once, and a unicycle that stops to turn is
     /// cut by none.
     pub fn words(&self, number: impl Fn(f64) -> String) -> String {
-        let worst = self.worst.as_ref().map_or(String::new(), |moment| format!(": {moment}"));
-        let largest = format!("{} m/s^2{worst}", number(self.largest));
+        let largest = format!("{} m/s^2: {}", number(self.largest), self.worst);
         let limit = number(self.limit);
         if self.exceeded == 0 {
             return format!("{largest}; robots without a fault kept the limit of {limit}");

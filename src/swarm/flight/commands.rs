@@ -1,6 +1,6 @@
 //! Commands from outside while robots fly: leaders sent to places, obstacles moved, poses made worse.
 
-use super::{Flight, faults};
+use super::Flight;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::RawCommandKind;
@@ -92,7 +92,7 @@ pub fn of(swarm: &Swarm, control: &Control) -> Result<Vec<(u64, FlightCommand)>,
         let what = match &raw.what {
             RawCommandKind::Lead { robot, to } => {
                 let key = format!("flight.commands[{k}].what.robot");
-                let member = faults::member(swarm, formation, &key, robot)?;
+                let member = formation.require(swarm, &key, robot)?;
                 if !formation.is_led(member) {
                     let message = format!("no program of this swarm leads `{robot}`");
                     return Err(swarm.refuse(&key, message, "name a robot of [[leaders]]"));

@@ -71,18 +71,9 @@ impl Fault {
 /// The faults of a swarm, in the order of the file.
 pub fn of(swarm: &Swarm, formation: &Formation) -> Result<Vec<Fault>, SceneError> {
     let fault = |(k, raw): (usize, &crate::scene::swarm::raw::RawFault)| {
-        let member = member(swarm, formation, &format!("flight.faults[{k}].robot"), &raw.robot)?;
+        let member = formation.require(swarm, &format!("flight.faults[{k}].robot"), &raw.robot)?;
         let until = raw.until.unwrap_or(f64::INFINITY);
         Ok(Fault { member, from: raw.at, until, kind: raw.what.clone() })
     };
     swarm.raw.flight.faults.iter().enumerate().map(fault).collect()
-}
-
-/// The member of this name, which stands at `key`.
-pub fn member(swarm: &Swarm, formation: &Formation, key: &str, name: &str) -> Result<usize, SceneError> {
-    formation.number(name).ok_or_else(|| {
-        let (first, last) = (&formation.names[0], &formation.names[formation.count() - 1]);
-        let message = format!("there is no robot `{name}`: they are called `{first}` to `{last}`");
-        swarm.refuse(key, message, "name a robot of this swarm")
-    })
 }

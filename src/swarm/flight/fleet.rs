@@ -30,11 +30,7 @@ impl Fleet {
     /// Names a robot that the swarm does not have.
     pub fn new(swarm: &Swarm, formation: &Formation) -> Result<Self, SceneError> {
         let raw = &swarm.raw;
-        let mut robots: Vec<Robot> = formation.places.iter().map(|place| Robot::at(place, 0.0)).collect();
-        for (k, start) in raw.flight.start.iter().enumerate() {
-            let m = faults::member(swarm, formation, &format!("flight.start[{k}].robot"), &start.robot)?;
-            robots[m].position = start.place;
-        }
+        let robots: Vec<Robot> = formation.starts(swarm)?.iter().map(|place| Robot::at(place, 0.0)).collect();
         let params = ChannelParams {
             noise: raw.flight.noise,
             delay: raw.flight.delay,

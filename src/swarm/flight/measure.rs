@@ -97,7 +97,8 @@ impl Record {
         let farthest = |place: &dyn Fn(usize) -> [f64; 2], sound_only: bool| {
             farthest(&present, time, place, |m| !sound_only || flight.fleet().is_sound(m))
         };
-        let affine = formation.affine(control.program_time());
+        // Before the programs begin there is no place by them.
+        let affine = formation.affine(control.program_time()).filter(|_| control.has_begun());
         let affine = affine.map(|map| farthest(&|m| map.apply(formation.places.get(m)), true));
         let led_to = |m: usize| Some(control.wanted(m)).filter(|place| place.iter().all(|x| x.is_finite()));
         let rest = formation.settled(&present).map(|rest| {

@@ -6,6 +6,7 @@ use super::moment::Extreme;
 use super::{AccelerationReport, Flight, Moment, Record, Sample};
 use crate::flock::role::Role;
 use crate::scene::swarm::Swarm;
+use crate::swarm::formation::first_few;
 
 /// Distances in \[m\], times in \[s\].
 #[derive(Clone, Debug, Serialize)]
@@ -34,6 +35,10 @@ pub struct FlightReport {
     pub programs_end: Option<f64>,
     /// Whether the flight lasted until then. Before, there is neither a settling time nor an end to be at.
     pub programs_ended: bool,
+    /// Robots of which no pose was ever believed; programs do not begin while a leader is among them.
+    pub never_heard: Vec<String>,
+    /// Whether the leaders' programs began.
+    pub programs_began: bool,
     /// Time after which the formation stayed within `settled_within` of its shape, counted from the end of the
     /// leaders' programs; absent where it never was, or where they did not end.
     pub settling_time: Option<f64>,
@@ -43,7 +48,7 @@ pub struct FlightReport {
     pub clearance: Option<f64>,
     /// The robots that came that close, when and where.
     pub closest: Option<Moment>,
-    /// How far the limit of acceleration was kept; absent where there is none.
+    /// How far the limit of acceleration was kept; absent where there is none, or no robot was ever without a fault.
     pub acceleration: Option<AccelerationReport>,
     /// Largest distance from the continuum run of the same scene; absent where there is none.
     pub continuum_error: Option<f64>,
@@ -121,6 +126,9 @@ impl FlightReport {
         let settled = match (self.settling_time, self.programs_end) {
             (Some(time), _) => format!("{} s to within {within} m", number(time)),
             (None, _) if self.programs_ended => format!("never within {within} m"),
+            (None, _) if !self.programs_began => {
+                "not measured: the leaders' programs never began, as not all leaders were heard".to_owned()
+            }
             (None, Some(end)) => {
                 format!(
                     "not measured: the flight ends before the leaders' programs, which take {} s",
@@ -144,6 +152,7 @@ impl FlightReport {
             ("Largest acceleration", self.acceleration.as_ref().map(|one| one.words(&number))),
             ("Way", Some(way)),
             ("Robots lost", (self.most_lost > 0).then(|| format!("{} at one time", self.most_lost))),
+            ("Never heard", first_few(self.never_heard.iter())),
         ];
         facts.into_iter().filter_map(|(name, value)| Some((name, value?))).collect()
     }
@@ -156,8 +165,10 @@ impl FlightReport {
         let bounds = &swarm.raw.flight.bounds;
         let programs_end = formation.programs_end();
         // The last period may end short of them by rounding.
-        let programs_ended =
-            flight.control().program_time() >= programs_end - 0.5 * flight.control().period();
+        let programs_ended = flight.control().has_begun()
+            && flight.control().program_time() >= programs_end - 0.5 * flight.control().period();
+        let never_heard = (0..formation.count()).filter(|&m| flight.control().position(m).is_none());
+        let never_heard: Vec<String> = never_heard.map(|m| formation.names[m].clone()).collect();
         let settling_time = settling_time(samples, programs_end, bounds.settled_within);
         let mut report = Self {
             name: swarm.name.clone(),
@@ -172,11 +183,12 @@ impl FlightReport {
             formation_error: largest_and_last(samples, |s| s.formation_error),
             programs_end: finite(programs_end),
             programs_ended,
+            programs_began: flight.control().has_begun(),
             settling_time: settling_time.filter(|_| programs_ended),
             settled_within: bounds.settled_within,
             closest: record.closest.map(|closest| closest.named(&formation.names)),
             clearance: finite(samples.iter().map(|s| s.clearance).fold(f64::INFINITY, f64::min)),
-            acceleration: record.accelerations.as_ref().map(|one| one.report(&formation.names)),
+            acceleration: record.accelerations.as_ref().and_then(|one| one.report(&formation.names)),
             continuum_error: largest_and_last(samples, |s| s.continuum_error).map(|[largest, _]| largest),
             pe1: largest_and_last(samples, |s| Some(s.pe1)).unwrap_or_default(),
             strain: largest_and_last(samples, |s| Some(s.strain)).unwrap_or_default(),
@@ -184,7 +196,8 @@ impl FlightReport {
                 record.ways.iter().sum::<f64>() / record.ways.len().max(1) as f64,
                 record.ways.iter().copied().fold(0.0, f64::max),
             ],
-            most_lost: samples.iter().map(|s| s.lost).max().unwrap_or(0),
+            most_lost: samples.iter().map(|s| s.lost).max().unwrap_or(0).max(never_heard.len()),
+            never_heard,
             bounds: Vec::new(),
             per_robot: (0..formation.count()).map(|m| robot(flight, record, m)).collect(),
         };

@@ -1,7 +1,7 @@
 //! Checks of a formation that has been laid out.
 
 use super::Formation;
-use crate::flock::vectors::distance;
+use crate::flock::vectors::{Vectors, distance};
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 
@@ -27,14 +27,45 @@ impl Formation {
         (0..self.count()).filter(|&m| is_judged && !reached[m]).collect()
     }
 
+    /// The member of a name that stands at `key`.
+    ///
+    /// # Errors
+    /// No member is called so.
+    pub fn require(&self, swarm: &Swarm, key: &str, name: &str) -> Result<usize, SceneError> {
+        self.number(name).ok_or_else(|| {
+            let (first, last) = (&self.names[0], &self.names[self.count() - 1]);
+            let message = format!("there is no robot `{name}`: they are called `{first}` to `{last}`");
+            swarm.refuse(key, message, "name a robot of this swarm")
+        })
+    }
+
+    /// Places at which the members start \[m\]: where the file says, else those in the formation.
+    ///
+    /// # Errors
+    /// Names a robot that the swarm does not have.
+    pub fn starts(&self, swarm: &Swarm) -> Result<Vectors, SceneError> {
+        let mut places = self.places.clone();
+        for (k, start) in swarm.raw.flight.start.iter().enumerate() {
+            let member = self.require(swarm, &format!("flight.start[{k}].robot"), &start.robot)?;
+            places.set(member, start.place);
+        }
+        Ok(places)
+    }
+
     /// Names of the members that are picked, the first few of them; none where none is.
     pub fn named(&self, is_picked: impl Fn(usize) -> bool) -> Option<String> {
-        let picked: Vec<usize> = (0..self.count()).filter(|&m| is_picked(m)).collect();
-        let shown: Vec<String> =
-            picked.iter().take(MOST_NAMED).map(|&m| format!("`{}`", self.names[m])).collect();
-        let more = picked.len().saturating_sub(MOST_NAMED);
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        (!picked.is_empty()).then(|| shown.join(", ") + &more)
+        first_few((0..self.count()).filter(|&m| is_picked(m)).map(|m| &self.names[m]))
+    }
+}
+
+/// The first few of these names and how many there are besides; none where there is no name.
+pub fn first_few<'a>(names: impl Iterator<Item = &'a String>) -> Option<String> {
+    let mut names = names.map(|name| format!("`{name}`"));
+    let shown = names.by_ref().take(MOST_NAMED).collect::<Vec<_>>().join(", ");
+    match names.count() {
+        _ if shown.is_empty() => None,
+        0 => Some(shown),
+        more => Some(format!("{shown} and {more} more")),
     }
 }
 

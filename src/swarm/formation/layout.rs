@@ -228,6 +228,13 @@ fn leads(
                 })
                 .collect::<Result<_, _>>()?,
         };
+        if let Program::Individual(tracks) = &entry.program
+            && let Some((name, _)) = tracks.iter().find(|(name, _)| !names.contains(name))
+        {
+            let message = format!("the file has rows for `{name}`, and there is no such robot");
+            let help = "name robots of this swarm";
+            return Err(swarm.refuse(&format!("leaders[{k}].program.path"), message, help));
+        }
         for m in members {
             leads[m] = Some((k, lead(swarm, k, &entry.program, &names[m], m, places)?));
         }

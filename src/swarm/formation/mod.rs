@@ -25,6 +25,7 @@ use crate::flock::vectors::{Vectors, distance};
 use crate::scene::swarm::NamedManoeuvre;
 use crate::swarm::resilience::{Trim, supported};
 use crate::sweep::Order;
+pub(in crate::swarm) use checks::first_few;
 pub use kept::LeadSnapshot;
 use settling::Settling;
 

@@ -52,8 +52,8 @@ pub struct SwarmPlan {
     pub leaders: usize,
     /// Neighbours of a follower, in the mean \[1\].
     pub neighbours: f64,
-    /// Smallest distance between two places of the formation \[m\].
-    pub spacing: f64,
+    /// Smallest distance between two places of the formation \[m\]; absent for a single robot.
+    pub spacing: Option<f64>,
     /// Free space between the two rims that are nearest at the places of the formation \[m\].
     pub free_space: Option<f64>,
     /// The model of the simulated robots.
@@ -157,7 +157,7 @@ impl SwarmPlan {
             robots: formation.count(),
             leaders,
             neighbours: neighbours(formation),
-            spacing: formation.spacing(),
+            spacing: (formation.count() > 1).then(|| formation.spacing()),
             free_space: free_space(formation),
             model: flight.fleet().model().name(),
             period_s: period,

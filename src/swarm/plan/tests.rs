@@ -62,6 +62,62 @@ fn what_the_file_cannot_hold_is_warned_of() {
     assert!(!jittery.to_string().contains("no robot will get a target"), "{jittery}");
 }
 
+#[test]
+fn what_a_network_that_changes_and_commands_do_is_warned_of() {
+    let channel = |noise: f64, delay: u32, loss: f64| {
+        let what = format!("{{ kind = \"channel\", noise = {noise}, delay = {delay}, loss = {loss} }}");
+        format!("flight.commands=[{{ after = 5, what = {what} }}]")
+    };
+    let lead = |to: &str| {
+        format!(
+            "flight.commands=[{{ after = 5, what = {{ kind = \"lead\", robot = \"robot_1\", to = {to} }} }}]"
+        )
+    };
+    let fence = "limits.geofence=[[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]]";
+    let solid = |at: &str| format!("obstacles=[{{ kind = \"disc\", centre = {at}, radius = 1.0 }}]");
+    let ranges = "ranges={ noise = 0.1, tolerance = 0.5 }";
+    let fault = |until: &str| {
+        format!("flight.faults=[{{ robot = \"robot_5\", at = 0.0, {until}what = {{ kind = \"silent\" }} }}]")
+    };
+    let two = "flight.faults=[{ robot = \"robot_1\", at = 2.0, until = 9.0, what = { kind = \"stuck\" } }, \
+               { robot = \"robot_1\", at = 5.0, what = { kind = \"dead\" } }]";
+    let cases: [(&[&str], &str); 9] = [
+        (
+            &[two],
+            "`robot_1` has one fault at a time: flight.faults[1] hides flight.faults[0] while both last",
+        ),
+        (&[&channel(0.5, 0, 0.0)], "lower flight.commands[0].what.noise"),
+        (&[&channel(0.0, 100, 0.0)], "lower flight.commands[0].what.delay"),
+        (&[&channel(0.0, 0, 1.0)], "lower flight.commands[0].what.loss"),
+        (
+            &[ranges, "flight.noise=0.2"],
+            "ranges.noise and flight.noise together, at three deviations 0.900 m",
+        ),
+        (&[&lead("[8.9, 0.0]"), fence], "flight.commands[0] leads `robot_1` out of limits.geofence"),
+        (
+            &[&lead("[-7.0, 0.0]"), &solid("[-7.0, 0.5]")],
+            "flight.commands[0] leads `robot_1` into an obstacle",
+        ),
+        (&[&fault("")], "the leaders' programs will not begin, for these leaders are never heard: `robot_5`"),
+        (
+            &[
+                &solid("[26.0, 6.0]"),
+                "manoeuvres=[{ name = \"turn\", legs = [{ seconds = 30.0, translate = [20.0, 0.0] }] }]",
+            ],
+            "programs end with these robots' places in an obstacle, before which they will stop: `robot_25`",
+        ),
+    ];
+    for (set, words) in cases {
+        let plan = plan("square", set);
+        assert!(plan.cautions.iter().any(|caution| caution.contains(words)), "{words}: {plan}");
+    }
+    for quiet in
+        [&[fault("until = 3.0, ").as_str()][..], &[ranges, "flight.noise=0.05"], &[&channel(0.01, 2, 0.5)]]
+    {
+        assert_eq!(plan("square", quiet).cautions, Vec::<String>::new(), "{quiet:?}");
+    }
+}
+
 /// The formation of `faulty-robot` in which every robot believes every other and none lies, led at 1 m/s.
 fn steadily_led(delay: u32) -> Swarm {
     let text = bundled_swarm("faulty-robot").expect("bundled").text;

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::{Convergence, DelayMargin, Exactness, ManoeuvreError, ManoeuvreSpeed, SpeedMargin, SwarmPlan};
+use crate::scene::text::counted;
 
 /// Smaller values read as zero to three places.
 const NOTHING: f64 = 0.001;
@@ -22,13 +23,20 @@ impl fmt::Display for SwarmPlan {
         let Self { robots, leaders, model, spacing, sweeps, period_s, .. } = self;
         line(
             "robots",
-            format!("{robots} ({leaders} leaders), simulated as {model}, {:.1} s", self.flight_s),
+            format!(
+                "{robots} ({}), simulated as {model}, {:.1} s",
+                counted(*leaders, "leader"),
+                self.flight_s
+            ),
         )?;
         let free =
             self.free_space.map_or(String::new(), |free| format!(", {free:.4} m between the nearest rims"));
-        let apart = if *robots > 1 { format!("places {spacing:.4} m apart{free}, ") } else { String::new() };
+        let apart = spacing.map_or(String::new(), |spacing| format!("places {spacing:.4} m apart{free}, "));
         line("formation", format!("{apart}{:.2} neighbours", self.neighbours))?;
-        line("loop", format!("a target every {period_s} s, at most {sweeps} sweeps of the rule in each"))?;
+        line(
+            "loop",
+            format!("a target every {period_s} s, at most {} of the rule in each", counted(*sweeps, "sweep")),
+        )?;
         match self.convergence {
             Some(Convergence { factor, half_life_s }) => {
                 let halves = half_life(half_life_s);

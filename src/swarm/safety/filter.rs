@@ -95,9 +95,9 @@ pub(super) struct Crowd {
     seen: Vec<bool>,
     /// Largest drift of a member from its pose \[m\].
     drift: f64,
-    /// Places at which members come to rest if they brake now \[m\]; empty where members need no way to brake.
-    pub(super) rest: Vec<[f64; 2]>,
-    /// All that each of those may take until it is at rest; those of members that went before are kept for their memory.
+    /// Whether members take time to brake.
+    pub(super) brakes: bool,
+    /// All that each of those may take until it is at rest; without meaning where they take none.
     pub(super) ways: Vec<Ways>,
     /// Largest distance of such a place from its member \[m\].
     longest: f64,
@@ -218,9 +218,9 @@ impl Filter {
         crowd.drift = drift;
         crowd.seen.clear();
         crowd.seen.extend(seen.present.iter().map(|[x, y]| x.is_finite() && y.is_finite()));
-        crowd.rest.clear();
         crowd.longest = 0.0;
-        if self.brakes(seen) {
+        self.crowd.brakes = self.brakes(seen);
+        if self.crowd.brakes {
             self.crowd.ways.resize_with(count, Ways::default);
             for member in 0..count {
                 let rest = self.resting_place(seen, period, member);
@@ -228,7 +228,6 @@ impl Filter {
                 let ways = &mut self.crowd.ways[member];
                 ways.take(seen.present.get(member), rest, places);
                 self.crowd.longest = self.crowd.longest.max(ways.extent);
-                self.crowd.rest.push(rest);
             }
         }
         if count < GRID_FROM {

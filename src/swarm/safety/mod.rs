@@ -64,19 +64,21 @@
 //! and `e`, all of which lie in the cell, and a pose that agrees with the model only takes places away. A member that is
 //! lost gets no target; its hull grows until it is at rest by its model, and stays.
 //!
-//! A pose that disagrees with the model moves the hull, perhaps to where others are. Then one more border parts a member
-//! from each single place of the other's. The other's true place was in its hull before, so that the member is clear of that, and
-//! stays clear of it. Its velocity is then known only up to what the model could have made of it since the pose before, so
-//! that the ways of some such velocities count too. A member that does what its model cannot is not covered, nor one that goes on, after a fault, from
-//! elsewhere than its targets were meant for, beyond its next pose.
+//! A pose that disagrees with the model moves the hull, perhaps to where others are. Then one more border parts a
+//! member from each single place of the other's. The other's true place was in its hull before, so that the member is
+//! clear of that, and stays clear of it. Its velocity is then known only up to what the model could have made of it
+//! since the pose before, so that the ways of some such velocities count too. A member that does what its model cannot
+//! is not covered, nor one that goes on, after a fault, from elsewhere than its targets were meant for, beyond its next
+//! pose.
 //!
 //! Of members whose targets are not known (other nodes send them), the last pose counts, by its age: they may be anywhere
 //! within what their limits allow, and a member that is perhaps too near goes on along its way or away from all of that.
 //!
-//! Members without that flag go no faster than lets them brake before every border of their cell, as it stands.
-//! Where a border comes too fast the cell is kept and the acceleration exceeded, with
-//! [`Flags::ACCELERATION_LIMITED`] set and the origin of the border; a flight reports how often. A late pose is of a place that its member has left, and two noisy ones give no
-//! velocity: such a member is taken to go from target to target, whose changes are then what the limit bounds.
+//! Members without that flag go no faster than lets them brake before every border of their cell, as it stands. Where a
+//! border comes too fast the cell is kept and the acceleration exceeded, with [`Flags::ACCELERATION_LIMITED`] set and
+//! the origin of the border; a flight reports how often. A late pose is of a place that its member has left, and two
+//! noisy ones give no velocity: such a member is taken to go from target to target, whose changes are then what the
+//! limit bounds.
 //!
 //! # Noise
 //! With [`Limits::deviation`] everything is kept three deviations of each member farther away, and the ways on which
@@ -95,7 +97,7 @@
 //! near each other: their borders follow from their own poses alone.
 //!
 //! It is a filter, not a planner: it goes around what is convex and may wait or wander before what is not.
-//! A member whose goal lies inside a solid circles it: keep targets out of solids.
+//! A member whose goal lies inside a solid, or outside the fence, stays where it is nearest to it.
 
 mod braking;
 mod cell;

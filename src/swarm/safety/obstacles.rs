@@ -134,16 +134,20 @@ impl Obstacles {
     }
 
     fn add_outline(&mut self, corners: &[[f64; 2]], inverted: bool, place: Place) -> Result<(), SafetyError> {
-        let twice_area = check_polygon(corners, place)?;
+        // Maps and drawings repeat the first corner at the end.
+        let mut corners = corners.to_vec();
+        corners.dedup();
+        while corners.len() > 1 && corners.first() == corners.last() {
+            corners.pop();
+        }
+        let twice_area = check_polygon(&corners, place)?;
         let outline = self.outlines.len();
         for (k, &a) in corners.iter().enumerate() {
             let b = corners[(k + 1) % corners.len()];
-            if a != b {
-                self.pieces.push(Piece::Edge { segment: Segment::new(vector(a), vector(b)), outline });
-            }
+            self.pieces.push(Piece::Edge { segment: Segment::new(vector(a), vector(b)), outline });
         }
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for corner in corners {
+        for corner in &corners {
             for k in 0..2 {
                 (low[k], high[k]) = (low[k].min(corner[k]), high[k].max(corner[k]));
             }

@@ -35,6 +35,9 @@ struct Origins {
     fence: usize,
 }
 
+/// Share of its size within which a member is as near as it gets to a goal that it cannot reach \[1\].
+const ARRIVED: f64 = 0.5;
+
 /// Share of the distance to keep that the shape cast leaves to rounding \[1\].
 const CAST_TOLERANCE: f64 = 1e-7;
 
@@ -56,7 +59,7 @@ impl Filter {
             self.detours[member].reset();
             return (here, Flags(Flags::HELD));
         }
-        let brakes = !self.crowd.rest.is_empty();
+        let brakes = self.crowd.brakes;
         let motion = self.motion(seen, period, member);
         let mut request = self.request(motion, way, period);
         let origins = self.enclose(seen, &mut request, member);
@@ -69,7 +72,7 @@ impl Filter {
         let goal = if !hindered && self.detours[member].is_fresh() {
             open
         } else {
-            self.around(&request, member, &mut flags)
+            self.around(&request, here, member, &mut flags)
         };
         let step = match motion {
             Some(Motion { velocity, .. }) if brakes => self.brakable(velocity, goal, period, &mut flags),
@@ -94,11 +97,11 @@ impl Filter {
             Some(Motion { from, velocity }) => {
                 let (most, ahead) = (self.limits.acceleration, length(from));
                 let top = (length(velocity) + most * period).min(self.limits.speed);
-                let reach = if self.crowd.rest.is_empty() {
-                    ahead + top * period + top * top / (2.0 * most)
-                } else {
+                let reach = if self.crowd.brakes {
                     // To the end of the longest step, and of the braking after it.
                     0.5 * period * length(velocity) + self.braking().covered([top, 0.0], period)[0]
+                } else {
+                    ahead + top * period + top * top / (2.0 * most)
                 };
                 MotionRequest { way, distance, step: step.min(ahead + top * period), reach }
             }
@@ -147,8 +150,8 @@ impl Filter {
         let here = seen.present.get(member);
         let drift = self.drift(seen, member);
         let margin = self.limits.margin();
-        let brakes = !self.crowd.rest.is_empty();
-        let rest = if brakes { self.crowd.rest[member] } else { here };
+        let brakes = self.crowd.brakes;
+        let rest = if brakes { self.crowd.ways[member].way[1] } else { here };
         for k in 0..self.crowd.found.len() {
             let other = self.crowd.found[k] as usize;
             let stray = drift + self.drift(seen, other);
@@ -198,12 +201,20 @@ impl Filter {
     }
 
     /// The point of the cell to go to: the nearest to the wanted one or, of a detour, to its aim.
-    fn around(&mut self, request: &MotionRequest, member: usize, flags: &mut Flags) -> [f64; 2] {
+    fn around(
+        &mut self,
+        request: &MotionRequest,
+        here: [f64; 2],
+        member: usize,
+        flags: &mut Flags,
+    ) -> [f64; 2] {
         let MotionRequest { way, distance, step, reach } = *request;
         let direct = self.cell.nearest(way, reach);
         let size = self.radii[member] + self.limits.clearance;
-        // Nearer to its goal than its own size, a member waits for the one that stands there.
-        if distance <= size || distance == 0.0 {
+        // Nearer to its goal than its own size, a member waits for the one that stands there; as near as solids let it come
+        // to one that they hide, it has arrived.
+        let hidden = self.nearest_to_stand([here[0] + way[0], here[1] + way[1]], member);
+        if distance <= size || distance == 0.0 || hidden > 0.0 && distance <= hidden + ARRIVED * size {
             self.detours[member].reset();
             return direct;
         }
@@ -221,6 +232,14 @@ impl Filter {
         let tick = Tick { scale, wanted: way, distance, straight, direct, moved: goal };
         detour.update(&self.limits.patience, &tick);
         goal
+    }
+
+    /// Distance from a place to the nearest one at which obstacles and the fence let the member stand \[m\], where one of them is
+    /// in the way; negative where it can stand there.
+    fn nearest_to_stand(&self, place: [f64; 2], member: usize) -> f64 {
+        let radius = self.radii[member] + self.limits.margin();
+        let obstacles = radius + self.limits.clearance - self.obstacles.distance(place);
+        obstacles.max(radius - self.fence.distance(place))
     }
 
     /// Brings the cell's borders and the end of the way as near as the member can go in a period and brake
@@ -277,7 +296,7 @@ impl Filter {
         let solids = &self.cell.planes[origins.obstacles..origins.fence];
         let disc = (self.radii[member] + self.limits.clearance) * (1.0 - CAST_TOLERANCE);
         // A member that brakes does not go straight.
-        if !self.crowd.rest.is_empty()
+        if self.crowd.brakes
             || solids.is_empty()
             || disc <= 0.0
             || solids.iter().any(|plane| plane.offset < 0.0)

@@ -224,7 +224,7 @@ fn a_key_that_is_already_there_is_not_suggested() {
 #[test]
 fn a_missing_key_is_placed_at_its_table_and_described() {
     let error = checked("\n\n[lattice]\nrows = 2\n", &[]).unwrap_err().to_string();
-    let help = "add `spacing`, which is a number [length]: Distance between neighbours [length].";
+    let help = "add `spacing`, which is a number [length]: Distance between neighbours.";
     assert_eq!(error, format!("s.toml:3: lattice.spacing: is missing\n  help: {help}"));
     assert!(checked("", &[]).unwrap_err().to_string().starts_with("s.toml: lattice: is missing"));
 }

@@ -75,7 +75,7 @@ pub enum RawModel {
     Integrator,
     /// Drives and turns: needs a speed limit.
     Unicycle {
-        /// [degree/s]
+        /// Fastest turn [degree/s].
         #[schemars(extend("exclusiveMinimum" = 0))]
         turn_rate: f64,
     },
@@ -89,7 +89,7 @@ pub enum RawModel {
 pub struct RawStart {
     /// Name of the robot.
     pub robot: String,
-    /// [m]
+    /// Where it starts [m].
     pub place: [f64; 2],
 }
 
@@ -122,14 +122,14 @@ pub enum RawFaultKind {
     Stuck,
     /// Sends its position with this offset.
     Offset {
-        /// [m]
+        /// How far off [m].
         by: [f64; 2],
     },
     /// Sends the same position again and again.
     Frozen,
     /// Sends random positions within this distance of its own.
     Random {
-        /// [m]
+        /// Largest distance from its own place [m].
         #[schemars(extend("exclusiveMinimum" = 0))]
         within: f64,
     },
@@ -157,7 +157,7 @@ pub enum RawCommandKind {
     Lead {
         /// Name of the robot.
         robot: String,
-        /// [m]
+        /// Where it goes [m].
         to: [f64; 2],
     },
     /// Moves an obstacle, at once.
@@ -200,7 +200,7 @@ pub struct RawBounds {
     /// leaders' programs [s], before which no flight keeps it.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub settling_time: Option<f64>,
-    /// [m]
+    /// Distance from its shape up to which the formation counts as settled [m].
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub settled_within: f64,
     /// Largest distance from the continuum run of the same scene, ever [m].

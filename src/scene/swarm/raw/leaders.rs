@@ -56,7 +56,7 @@ pub enum RawProgram {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawWaypoint {
-    /// [s]
+    /// When it is there [s].
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub at: f64,
     /// From the place in the formation [m].

@@ -107,7 +107,7 @@ pub struct RawRobot {
     pub name: String,
     /// Its place in the formation [m].
     pub place: [f64; 2],
-    /// [m]
+    /// Its radius, if not that of all robots [m].
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub radius: Option<f64>,
@@ -122,13 +122,13 @@ pub struct RawRobot {
 pub enum RawLinks {
     /// The nearest in the formation; of equally near ones all.
     Nearest {
-        /// [1]
+        /// Neighbours of each robot [1].
         #[schemars(range(min = 1))]
         count: usize,
     },
     /// All robots with a place within a radius in the formation.
     Within {
-        /// [m]
+        /// Distance up to which robots are neighbours [m].
         #[schemars(extend("exclusiveMinimum" = 0))]
         radius: f64,
     },
@@ -136,7 +136,7 @@ pub enum RawLinks {
     Listed {},
     /// All robots within a radius now, found anew every period.
     Present {
-        /// [m]
+        /// Distance up to which robots are neighbours [m].
         #[schemars(extend("exclusiveMinimum" = 0))]
         radius: f64,
     },

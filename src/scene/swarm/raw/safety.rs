@@ -36,9 +36,9 @@ pub enum RawObstacle {
     },
     /// A full disc.
     Disc {
-        /// [m]
+        /// Place of its middle [m].
         centre: [f64; 2],
-        /// [m]
+        /// From its middle to its rim [m].
         #[schemars(extend("exclusiveMinimum" = 0))]
         radius: f64,
     },

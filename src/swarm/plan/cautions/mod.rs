@@ -1,15 +1,17 @@
 //! Warnings before a flight that follow from the file and the formation's places alone.
 
-use super::{ManoeuvreSpeed, largest_noise, needed};
+mod network;
+
+use super::{ManoeuvreSpeed, needed};
 use crate::continuum::late::beyond;
 use crate::flock::manoeuvre::Manoeuvre;
 use crate::flock::motion::{Keyframe, Motion};
 use crate::flock::vectors::distance;
-use crate::scene::swarm::raw::{RawFaultKind, RawSwarm};
+use crate::scene::swarm::raw::{RawCommandKind, RawSwarm};
 use crate::scene::swarm::{Program, Swarm};
 use crate::swarm::flight::Flight;
 use crate::swarm::formation::Formation;
-use crate::swarm::safety::Limits;
+pub use network::late_without_speed;
 
 /// Parts of a leg or of a program between which a leader's way is looked at.
 const PARTS: usize = 40;
@@ -17,28 +19,15 @@ const PARTS: usize = 40;
 /// Less than this is rounding \[m\] or \[m/s\].
 const ROUNDING: f64 = 1e-9;
 
-/// Poses of real robots are always late, if only by their way through the network.
-pub fn late_without_speed(limits: &Limits) -> Option<&'static str> {
-    (limits.keeps_apart && limits.speed.is_infinite()).then_some(
-        "limits.clearance without limits.speed holds for poses of now alone, and those of real robots are late: give \
-         limits.speed",
-    )
-}
-
 /// All of them.
 pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
     let formation = flight.control().formation();
     let raw = &swarm.raw;
     let one = [
-        noise(raw, formation),
-        delay(raw),
         late_faults(flight, raw),
+        hidden_fault(raw),
         late_commands(flight, raw),
-        (raw.flight.loss >= 1.0)
-            .then(|| "every pose is lost: no robot will get a target; lower flight.loss".to_owned()),
-        silent(raw, flight),
         unled(formation),
-        unmeasured(raw, formation),
         outside(flight, "start", &|m| flight.fleet().robots()[m].position),
         (!raw.flight.start.is_empty())
             .then(|| outside(flight, "have their places in the formation", &|m| formation.places.get(m)))
@@ -46,45 +35,17 @@ pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
         near_at_the_start(flight, raw),
         led_outside(flight),
         in_solids(flight),
+        led_into_solids(flight),
     ];
     let fast = fast_manoeuvres(raw, formation).chain(fast_paths(swarm));
-    one.into_iter().flatten().chain(fast).chain(narrow(raw, formation)).collect()
-}
-
-fn noise(raw: &RawSwarm, formation: &Formation) -> Option<String> {
-    largest_noise(formation, raw.limits.clearance).filter(|largest| raw.flight.noise > *largest).map(|_| {
-        "the noise takes up the space between robots at their places: the filter will hold some of them; \
-         lower flight.noise or limits.clearance, or space the robots out"
-            .into()
-    })
-}
-
-fn delay(raw: &RawSwarm) -> Option<String> {
-    let period = raw.control.period;
-    let (delay, jitter) = (f64::from(raw.flight.delay), f64::from(raw.flight.jitter));
-    if delay * period > raw.poses.age_limit {
-        return Some(
-            "poses are older than poses.age_limit when they arrive: no robot will get a target; lower flight.delay or \
-             raise the limit"
-                .into(),
-        );
-    }
-    ((delay + jitter) * period > raw.poses.age_limit).then(|| {
-        "jitter makes some poses older than poses.age_limit: robots will be lost for periods at a time; lower \
-         flight.jitter or raise the limit"
-            .into()
-    })
-}
-
-/// Robots that move on unheard, at any speed.
-fn silent(raw: &RawSwarm, flight: &Flight) -> Option<String> {
-    use RawFaultKind::{NotANumber, Silent, WrongFrame};
-    late_without_speed(flight.control().limits())?;
-    let fault = raw.flight.faults.iter().find(|one| matches!(one.what, Silent | NotANumber | WrongFrame))?;
-    Some(format!(
-        "how far `{}` goes once it is not heard is unknown: no clearance from it is kept; give limits.speed",
-        fault.robot
-    ))
+    let commanded = commanded_astray(raw, flight);
+    network::of(raw, flight)
+        .into_iter()
+        .chain(one.into_iter().flatten())
+        .chain(commanded)
+        .chain(fast)
+        .chain(narrow(raw, formation))
+        .collect()
 }
 
 /// Faults that begin when the flight is over. What is done at its very end is how a session that was saved there ended.
@@ -93,6 +54,23 @@ fn late_faults(flight: &Flight, raw: &RawSwarm) -> Option<String> {
     let late = raw.flight.faults.iter().enumerate().filter(|(_, fault)| fault.at > end);
     let keys = late.map(|(k, fault)| format!("flight.faults[{k}].at = {}", fault.at));
     beyond(&format!("the end of the flight, at {end} s"), keys, "flight.duration")
+}
+
+/// A fault that another of the same robot hides.
+fn hidden_fault(raw: &RawSwarm) -> Option<String> {
+    let faults = &raw.flight.faults;
+    let until = |k: usize| faults[k].until.unwrap_or(f64::INFINITY);
+    let meet = |first: usize, second: usize| {
+        let [a, b] = [first, second].map(|k| &faults[k]);
+        a.robot == b.robot && a.at < until(second) && b.at < until(first)
+    };
+    let mut pairs = (0..faults.len()).flat_map(|second| (0..second).map(move |first| (first, second)));
+    let (first, second) = pairs.find(|&(first, second)| meet(first, second))?;
+    Some(format!(
+        "`{}` has one fault at a time: flight.faults[{second}] hides flight.faults[{first}] while both last; let the one end \
+         before the other begins",
+        faults[first].robot
+    ))
 }
 
 /// Commands for periods that are not flown.
@@ -112,20 +90,6 @@ fn unled(formation: &Formation) -> Option<String> {
     let names = formation.named(|m| unled.contains(&m))?;
     Some(format!(
         "no leader reaches {names}: these robots follow each other alone; link them to the others, or let one of them lead"
-    ))
-}
-
-/// Robots whose poses too few others measure to contradict them.
-fn unmeasured(raw: &RawSwarm, formation: &Formation) -> Option<String> {
-    let ranges = raw.ranges.as_ref()?;
-    let near = |m: usize| {
-        let apart = |other: &usize| distance(formation.places.get(m), formation.places.get(*other));
-        (0..formation.count()).filter(|other| *other != m && apart(other) <= ranges.reach).count()
-    };
-    let names = formation.named(|m| near(m) <= ranges.max_faulty)?;
-    Some(format!(
-        "no more than ranges.max_faulty robots are within ranges.reach of {names}: lies of these robots are never found; \
-         lower the one or raise the other"
     ))
 }
 
@@ -174,6 +138,35 @@ fn in_solids(flight: &Flight) -> Option<String> {
     let overlaps = |m: usize| obstacles.distance(formation.places.get(m)) < formation.radii[m] - ROUNDING;
     let names = formation.named(overlaps)?;
     Some(format!("an obstacle stands at the places of {names} in the formation; move one of them"))
+}
+
+/// Leaders whose programs end in an obstacle.
+fn led_into_solids(flight: &Flight) -> Option<String> {
+    let (obstacles, formation) = (flight.control().filter().obstacles(), flight.control().formation());
+    let end = Some(formation.programs_end()).filter(|end| end.is_finite() && *end > 0.0)?;
+    let is_in_one = |place: [f64; 2], m: usize| obstacles.distance(place) < formation.radii[m] - ROUNDING;
+    let names = formation.named(|m| formation.led_to(m, end).is_some_and(|place| is_in_one(place, m)))?;
+    Some(format!(
+        "programs end with these robots' places in an obstacle, before which they will stop: {names}; move it, or \
+         change their programs"
+    ))
+}
+
+/// Commands that lead robots to where they cannot stand.
+fn commanded_astray<'a>(raw: &'a RawSwarm, flight: &'a Flight) -> impl Iterator<Item = String> + 'a {
+    let (filter, formation) = (flight.control().filter(), flight.control().formation());
+    raw.flight.commands.iter().enumerate().filter_map(move |(k, command)| {
+        let RawCommandKind::Lead { robot, to } = &command.what else { return None };
+        let radius = formation.radii[formation.number(robot)?] - ROUNDING;
+        let why = match () {
+            () if !filter.is_fenced_in(*to, radius) => "out of limits.geofence",
+            () if filter.obstacles().distance(*to) < radius => "into an obstacle",
+            () => return None,
+        };
+        Some(format!(
+            "flight.commands[{k}] leads `{robot}` {why}, where it cannot come to stand; lead it elsewhere"
+        ))
+    })
 }
 
 fn fast_manoeuvres(raw: &RawSwarm, formation: &Formation) -> impl Iterator<Item = String> {

@@ -1,0 +1,150 @@
+//! Warnings of what becomes of poses and ranges on their way, and of robots that are not heard.
+
+use super::super::{DEVIATIONS_KEPT, largest_noise};
+use crate::flock::vectors::distance;
+use crate::scene::swarm::raw::{RawCommandKind, RawFaultKind, RawSwarm};
+use crate::swarm::flight::Flight;
+use crate::swarm::formation::Formation;
+use crate::swarm::safety::Limits;
+
+/// What becomes of poses on their way, from the start or from a command on.
+struct Network {
+    /// Key of the file that has it.
+    key: String,
+    /// \[m\]
+    noise: f64,
+    /// \[period\]
+    delay: u32,
+    /// \[period\]
+    jitter: u32,
+    /// \[1\]
+    loss: f64,
+}
+
+/// Those of a flight, in order.
+fn networks(raw: &RawSwarm) -> Vec<Network> {
+    let flight = &raw.flight;
+    let jitter = flight.jitter;
+    let first =
+        Network { key: "flight".into(), noise: flight.noise, delay: flight.delay, jitter, loss: flight.loss };
+    let commanded = flight.commands.iter().enumerate().filter_map(|(k, command)| match command.what {
+        RawCommandKind::Channel { noise, delay, loss } => {
+            Some(Network { key: format!("flight.commands[{k}].what"), noise, delay, jitter, loss })
+        }
+        _ => None,
+    });
+    std::iter::once(first).chain(commanded).collect()
+}
+
+/// All of them.
+pub fn of(raw: &RawSwarm, flight: &Flight) -> Vec<String> {
+    let formation = flight.control().formation();
+    let networks = networks(raw);
+    let of_each = networks.iter().flat_map(|network| {
+        [network.noise(raw, formation), network.delay(raw), network.loss(), network.ranges(raw)]
+    });
+    let others = [silent(raw, flight), never_heard(raw, flight), unmeasured(raw, formation)];
+    of_each.chain(others).flatten().collect()
+}
+
+impl Network {
+    fn noise(&self, raw: &RawSwarm, formation: &Formation) -> Option<String> {
+        let largest = largest_noise(formation, raw.limits.clearance)?;
+        (self.noise > largest).then(|| {
+            format!(
+                "the noise takes up the space between robots at their places: the filter will hold some of them; lower \
+                 {}.noise or limits.clearance, or space the robots out",
+                self.key
+            )
+        })
+    }
+
+    fn delay(&self, raw: &RawSwarm) -> Option<String> {
+        let Self { key, delay, jitter, .. } = self;
+        let is_too_old = |periods: u32| f64::from(periods) * raw.control.period > raw.poses.age_limit;
+        if is_too_old(*delay) {
+            return Some(format!(
+                "poses are older than poses.age_limit when they arrive: no robot will get a target; lower {key}.delay or \
+                 raise the limit"
+            ));
+        }
+        is_too_old(delay + jitter).then(|| {
+            format!(
+                "jitter makes some poses older than poses.age_limit: robots will be lost for periods at a time; lower \
+                 flight.jitter{} or raise the limit",
+                if *key == "flight" { String::new() } else { format!(" or {key}.delay") }
+            )
+        })
+    }
+
+    fn loss(&self) -> Option<String> {
+        let key = &self.key;
+        (self.loss >= 1.0)
+            .then(|| format!("every pose is lost: no robot will get a target; lower {key}.loss"))
+    }
+
+    /// Ranges that contradict honest poses: their own noise along the way, and that of both poses.
+    fn ranges(&self, raw: &RawSwarm) -> Option<String> {
+        let ranges = raw.ranges.as_ref()?;
+        let off = DEVIATIONS_KEPT * (ranges.noise.powi(2) + 2.0 * self.noise.powi(2)).sqrt();
+        (off > ranges.tolerance).then(|| {
+            format!(
+                "ranges.noise and {}.noise together, at three deviations {off:.3} m, are above ranges.tolerance: honest \
+                 robots will be taken for liars; lower them, or raise the tolerance",
+                self.key
+            )
+        })
+    }
+}
+
+/// Poses of real robots are always late, if only by their way through the network.
+pub fn late_without_speed(limits: &Limits) -> Option<&'static str> {
+    (limits.keeps_apart && limits.speed.is_infinite()).then_some(
+        "limits.clearance without limits.speed holds for poses of now alone, and those of real robots are late: give \
+         limits.speed",
+    )
+}
+
+/// Robots that move on unheard, at any speed.
+fn silent(raw: &RawSwarm, flight: &Flight) -> Option<String> {
+    use RawFaultKind::{NotANumber, Silent, WrongFrame};
+    late_without_speed(flight.control().limits())?;
+    let fault = raw.flight.faults.iter().find(|one| matches!(one.what, Silent | NotANumber | WrongFrame))?;
+    Some(format!(
+        "how far `{}` goes once it is not heard is unknown: no clearance from it is kept; give limits.speed",
+        fault.robot
+    ))
+}
+
+/// Leaders of which no pose is ever believed.
+fn never_heard(raw: &RawSwarm, flight: &Flight) -> Option<String> {
+    use RawFaultKind::{Dead, NotANumber, Silent, WrongFrame};
+    let formation = flight.control().formation();
+    let end = flight.periods() as f64 * raw.control.period;
+    let is_mute = |member: usize| {
+        raw.flight.faults.iter().any(|fault| {
+            formation.number(&fault.robot) == Some(member)
+                && matches!(fault.what, Dead | NotANumber | Silent | WrongFrame)
+                && fault.at <= 0.0
+                && fault.until.is_none_or(|until| until >= end)
+        })
+    };
+    let names = formation.named(|m| formation.leads(m) && is_mute(m))?;
+    Some(format!(
+        "the leaders' programs will not begin, for these leaders are never heard: {names}; let their faults begin later, or end"
+    ))
+}
+
+/// Robots whose poses too few others measure to contradict them.
+fn unmeasured(raw: &RawSwarm, formation: &Formation) -> Option<String> {
+    let ranges = raw.ranges.as_ref()?;
+    let near = |m: usize| {
+        let apart = |other: &usize| distance(formation.places.get(m), formation.places.get(*other));
+        (0..formation.count()).filter(|other| *other != m && apart(other) <= ranges.reach).count()
+    };
+    let names = formation.named(|m| near(m) <= ranges.max_faulty)?;
+    Some(format!(
+        "no more than ranges.max_faulty robots are within ranges.reach of {names}: lies of these robots are never found; \
+         lower the one or raise the other"
+    ))
+}
