@@ -239,6 +239,13 @@ fn unsafe_code_stands_where_it_was_measured_to_pay_or_where_the_system_is_called
     assert_eq!(files_with("unsafe {"), known);
 }
 
+/// A standard error that is full or closed ends no command.
+#[test]
+fn no_line_to_standard_error_can_end_the_program() {
+    let others = files_with("eprintln!").into_iter().filter(|file| !file.starts_with("examples"));
+    assert_eq!(others.collect::<Vec<_>>(), Vec::<String>::new());
+}
+
 #[test]
 fn films_are_drawn_by_the_figures() {
     let own = |word: &str| files_with(word).into_iter().any(|file| file.starts_with("export/film/"));

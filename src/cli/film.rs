@@ -145,7 +145,7 @@ impl Finish<'_> {
             (true, false) => Some("figures are missing"),
             (true, true) => Some("figures and the film are missing"),
         };
-        missing.iter().for_each(|missing| eprintln!("interrupted: {missing}, the rest is written"));
+        missing.iter().for_each(|missing| note!("interrupted: {missing}, the rest is written"));
         let is_whole = missing.is_none() && !self.is_interrupted;
         if is_whole {
             self.report.show(self.kept);

@@ -33,11 +33,11 @@ pub fn gallery(arguments: &GalleryArguments) -> Result<ExitCode, Refusal> {
     let interrupted = interrupt::keeps();
     for (n, exhibit) in exhibits.iter().enumerate() {
         if !arguments.output.quiet {
-            eprintln!("{:>3} of {}  {}", n + 1, exhibits.len(), exhibit.name);
+            note!("{:>3} of {}  {}", n + 1, exhibits.len(), exhibit.name);
         }
         run(exhibit, folder.path(exhibit.folder()), interrupted)?;
         if interrupted.load(Ordering::Relaxed) {
-            eprintln!("{}", interrupt::NOTHING_KEPT);
+            note!("{}", interrupt::NOTHING_KEPT);
             return Ok(ExitCode::from(FAILED));
         }
     }

@@ -7,7 +7,6 @@
 //! end has begun. A second signal ends any command at once, but for one that [`serves`]: `ros2 launch` and `timeout` signal
 //! a group of processes and each of them, and a node has its leave to take. There the signals of [`ONE_SIGNAL`] are one.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
@@ -209,8 +208,7 @@ fn end() -> ! {
 
 fn print(words: &str) {
     if !words.is_empty() {
-        // A closed stderr must not keep the program from ending: `eprintln` would panic.
-        let _ = writeln!(std::io::stderr(), "{words}");
+        note!("{words}");
     }
 }
 

@@ -125,7 +125,7 @@ impl PageArguments {
     pub fn announce(&self, server: &Server) -> Result<Option<PathBuf>, Refusal> {
         let address = server.address();
         print(&format!("{address}\n"))?;
-        eprintln!("open this address in a browser on this computer; it ends with an interrupt (Ctrl-C)");
+        note!("open this address in a browser on this computer; it ends with an interrupt (Ctrl-C)");
         Ok(self.open.then(|| open(&address)).flatten())
     }
 }
@@ -178,7 +178,7 @@ fn open(address: &str) -> Option<PathBuf> {
     let page = format!("<!doctype html><meta http-equiv=\"refresh\" content=\"0;url={address}\">\n");
     let written = options.open(&door).and_then(|mut file| file.write_all(page.as_bytes()));
     if let Err(error) = written.and_then(|()| output::open(&door)) {
-        eprintln!("cannot open a browser: {error}; open the address by hand");
+        note!("cannot open a browser: {error}; open the address by hand");
     }
     Some(door)
 }

@@ -1,5 +1,13 @@
 //! The command line: commands, options, and the function behind each.
 
+/// Writes a line to standard error, and goes on where nothing takes it: work is not lost with a caution.
+macro_rules! note {
+    ($($words:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr(), $($words)*);
+    }};
+}
+
 mod bench;
 mod bundle;
 mod checkpoint;
@@ -375,7 +383,7 @@ pub fn watch_interrupts() {
 pub fn refuse(refusal: &Refusal) -> ExitCode {
     interrupt::leave_to_the_end();
     if interrupt::is_raised() {
-        eprintln!("{}", interrupt::NOTHING_KEPT);
+        note!("{}", interrupt::NOTHING_KEPT);
         return ExitCode::from(FAILED);
     }
     if matches!(
@@ -392,7 +400,7 @@ pub fn refuse(refusal: &Refusal) -> ExitCode {
             _ => u8::try_from(usage.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from),
         };
     }
-    eprintln!("error: {}", on_terminal(&refusal.to_string()));
+    note!("error: {}", on_terminal(&refusal.to_string()));
     ExitCode::from(if refusal.is_failure() { FAILED } else { BAD_INPUT })
 }
 

@@ -43,7 +43,7 @@ impl ReportArguments {
             return;
         }
         if let Err(error) = open(&report) {
-            eprintln!("cannot open {}: {error}; open it by hand", report.display());
+            note!("cannot open {}: {error}; open it by hand", report.display());
         }
     }
 }

@@ -55,7 +55,7 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
                 let value = json!({ "name": scene.name, "title": scene.raw.title, "facts": facts.collect::<Vec<_>>() });
                 let words = of_parts.iter().flatten().map(|(name, value)| format!("{name}: {value}\n"));
                 let words = format!("{}\n{}", scene.raw.title, words.collect::<String>());
-                eprintln!("the whole is not planned here: {too_large}");
+                note!("the whole is not planned here: {too_large}");
                 return if *json { Ok(print(&format!("{value:#}\n"))?) } else { Ok(say(&words)?) };
             }
             let plan = plan_of(&scene)?;

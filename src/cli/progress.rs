@@ -98,7 +98,7 @@ impl Way {
                 if let Ok(mut last) = last.lock()
                     && last.is_none_or(|last| last.elapsed() >= BETWEEN_LINES)
                 {
-                    eprintln!("{}", line());
+                    note!("{}", line());
                     *last = Some(Instant::now());
                 }
             }

@@ -201,7 +201,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
 
     let undrawn = left.as_ref().map_or_else(Vec::new, |left| left.undrawn(&scene));
     if arguments.outputs().draws() && !undrawn.is_empty() && !arguments.output.quiet {
-        eprintln!(
+        note!(
             "caution: no figures were asked for until now: there are none of steps {}",
             undrawn.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
         );

@@ -91,9 +91,7 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let swarm = arguments.swarm.load()?;
     let flight = Flight::new(&swarm)?;
     if !arguments.output.quiet {
-        cautions::of(&swarm, &flight)
-            .iter()
-            .for_each(|caution| eprintln!("caution: {}", on_terminal(caution)));
+        cautions::of(&swarm, &flight).iter().for_each(|caution| note!("caution: {}", on_terminal(caution)));
     }
     let (folder, force) = (arguments.output.folder(&swarm.name)?, arguments.output.force);
     let film = arguments.film.open(&folder, force)?;

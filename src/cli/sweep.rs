@@ -264,7 +264,7 @@ fn sweep_here(arguments: &SweepArguments) -> Result<ExitCode, Refusal> {
     let made = runs.make((sweep.rows.len(), &pending), &journal, arguments.output.quiet)?;
     drop(journal);
     if interrupted.load(std::sync::atomic::Ordering::Relaxed) {
-        eprintln!("{words}");
+        note!("{words}");
         return Ok(ExitCode::from(FAILED));
     }
     sweep.rows.extend(made.into_iter().map(|row| (row.run, row)));
@@ -326,7 +326,7 @@ fn merge(arguments: &SweepArguments, start: Instant) -> Result<ExitCode, Refusal
         return Ok(code);
     }
     let (count, first) = (missing.len(), missing[0]);
-    eprintln!(
+    note!(
         "{count} runs are missing, the first is run {first}: `flockform sweep --resume {}` makes them",
         out.display()
     );

@@ -38,7 +38,7 @@ const SOUND: Series = Series { model: DOUBLE, delay: 0, noise: 0.0, loss: 0.0, f
 /// What stops a robot, or its poses.
 const STOPS: &[&str] = &["silent", "dead", "stuck"];
 
-const SERIES: [Series; 16] = [
+const SERIES: [Series; 19] = [
     SOUND,
     Series { delay: 3, ..SOUND },
     Series { model: SINGLE, ..SOUND },
@@ -50,6 +50,9 @@ const SERIES: [Series; 16] = [
     Series { noise: 0.02, ..SOUND },
     Series { model: SINGLE, noise: 0.02, ..SOUND },
     Series { model: UNICYCLE, noise: 0.02, ..SOUND },
+    Series { delay: 3, noise: 0.02, ..SOUND },
+    Series { delay: 6, noise: 0.02, loss: 0.5, ..SOUND },
+    Series { model: SINGLE, delay: 3, noise: 0.02, ..SOUND },
     Series { faults: STOPS, ..SOUND },
     Series { faults: STOPS, delay: 6, ..SOUND },
     Series { faults: STOPS, loss: 0.7, ..SOUND },
@@ -180,6 +183,29 @@ fn no_flight_falls_below_the_declared_clearance() {
         let outcome = fly_all(series, 100 + k as u64, 60);
         assert_eq!(outcome.broken, 0, "{series:?}: {outcome:?}");
         assert!(outcome.too_fast < ROUNDING, "{series:?}: {outcome:?}");
+    }
+}
+
+/// Two that are led through each other at full speed, whose braking is as long as their way is known badly.
+#[test]
+fn noise_does_not_bring_robots_that_brake_nearer_than_declared_bit_by_bit() {
+    let two = "title = \"two\"\nradius = 0.2\nlinks = { kind = \"nearest\", count = 1 }\n\
+               robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [4.0, 0.1] }]\n\
+               leaders = [{ robots = [\"a\"], program = { kind = \"path\", points = [{ at = 6.0, displacement = [4.0, 0.0] }] } }, \
+               { robots = [\"b\"], program = { kind = \"path\", points = [{ at = 6.0, displacement = [-4.0, 0.0] }] } }]\n\
+               limits = { speed = 2.0, acceleration = 1.0, clearance = 0.1 }\ncontrol = { period = 0.02 }\n";
+    for (noise, delay, seed) in [0.001, 0.01, 0.03].into_iter().flat_map(|noise| {
+        [0, 1, 2, 5].into_iter().flat_map(move |delay| (0..4).map(move |seed| (noise, delay, seed)))
+    }) {
+        let flight = format!(
+            "flight={{ duration = 20.0, model = {DOUBLE}, noise = {noise}, delay = {delay}, seed = {seed} }}"
+        );
+        let swarm =
+            Swarm::parse("two", "two.toml", two, &[flight], None).unwrap_or_else(|error| panic!("{error}"));
+        let (_, report) = fly(&swarm, &mut |_, _| ControlFlow::Continue(())).expect("flies");
+        let clearance = report.clearance.expect("two robots");
+        assert!(clearance >= 0.1 - ROUNDING, "noise {noise}, delay {delay}, seed {seed}: {clearance}");
+        assert!(report.per_robot[0].x > 3.8, "noise {noise}, delay {delay}, seed {seed}: {report:?}");
     }
 }
 

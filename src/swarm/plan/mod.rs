@@ -27,6 +27,7 @@ use crate::scene::swarm::raw::RawModel;
 use crate::scene::swarm::{Shape, Swarm};
 use crate::solve::spectrum::LinearSweep;
 use crate::swarm::flight::Flight;
+use crate::swarm::safety::Limits;
 pub use exactness::{Exactness, ManoeuvreError};
 use period_map::PeriodMap;
 
@@ -109,6 +110,9 @@ pub struct DelayMargin {
     pub largest_s: f64,
     /// The same in whole periods.
     pub largest_periods: usize,
+    /// Age from which on two robots at their places may be too near for all that poses say, so that they hold each other \[s\];
+    /// absent where robots are not kept apart, or are predicted.
+    pub room_s: Option<f64>,
     /// Time in which the slowest part of a disturbance halves under the simulated delay \[s\].
     pub half_life_s: Option<f64>,
 }
@@ -173,6 +177,7 @@ impl SwarmPlan {
                 largest_s: raw.poses.age_limit,
                 // Of an exact multiple all periods count, whatever rounding makes of it.
                 largest_periods: (raw.poses.age_limit / period * (1.0 + 1e-12)) as usize,
+                room_s: room_for_delay(formation, flight.control().limits()),
                 half_life_s: convergence.and_then(|one| Some(one.half_life_s? * (delay + 1.0))),
             },
             speed: speed(swarm, formation, map.as_ref(), delay),
@@ -208,6 +213,25 @@ fn free_space(formation: &Formation) -> Option<f64> {
 fn largest_noise(formation: &Formation, clearance: Option<f64>) -> Option<f64> {
     let free = free_space(formation)? - clearance?;
     Some((free / (2.0 * DEVIATIONS_KEPT)).max(0.0))
+}
+
+/// Age of poses at which two robots at their places are perhaps too near \[s\]: each may be anywhere within the speed limit by then,
+/// and the line between the two is off by as much (see the docs of `swarm::safety`).
+fn room_for_delay(formation: &Formation, limits: &Limits) -> Option<f64> {
+    if !limits.keeps_apart || limits.brakes || !limits.speed.is_finite() {
+        return None;
+    }
+    let Formation { places, radii, .. } = formation;
+    let room = |i: usize, j: usize| {
+        let (apart, keep) = (
+            distance(places.get(i), places.get(j)),
+            radii[i] + radii[j] + limits.clearance + 2.0 * limits.margin(),
+        );
+        // Where sqrt(apart^2 - off^2) = keep + off.
+        let off = 0.5 * ((2.0 * apart * apart - keep * keep).max(0.0).sqrt() - keep);
+        off.max(0.0) / (2.0 * limits.speed)
+    };
+    (0..formation.count()).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| room(i, j)).reduce(f64::min)
 }
 
 /// The reason for which a period is no linear map, as far as the file shows it.

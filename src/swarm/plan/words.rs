@@ -57,10 +57,12 @@ impl fmt::Display for SwarmPlan {
                 line("comes to rest", format!("not predicted: {}", self.not_predicted.unwrap_or_default()))?
             }
         }
-        let DelayMargin { largest_s, largest_periods, .. } = self.delay;
+        let DelayMargin { largest_s, largest_periods, room_s, .. } = self.delay;
+        let room = room_s
+            .map_or(String::new(), |room| format!("; up to {room:.3} s robots at their places have room"));
         line(
             "delay margin",
-            format!("poses are used up to an age of {largest_s} s, {largest_periods} periods"),
+            format!("poses are used up to an age of {largest_s} s, {largest_periods} periods{room}"),
         )?;
         match self.noise.gain {
             None => {}

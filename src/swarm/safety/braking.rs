@@ -30,11 +30,20 @@ impl Filter {
         [here[0] + way[0], here[1] + way[1]]
     }
 
+    /// The place at which the member was last sent to come to rest, relative to it \[m\], and how far noise may put the one at
+    /// which it seems to come to rest from it \[m\].
+    pub(super) fn promised(&self, seen: &Seen, member: usize) -> ([f64; 2], f64) {
+        let (here, last) = (seen.present.get(member), self.sent.get(member));
+        let error = seen.strays.map_or(0.0, |strays| strays[member].error);
+        ([last[0] - here[0], last[1] - here[1]], error)
+    }
+
     /// The place to come to rest at \[m\], relative to the member, with the step towards `goal` after which it still
     /// can within its cell; one along which it brakes if there is none.
     pub(super) fn brakable(
         &self,
         velocity: [f64; 2],
+        (promised, error): ([f64; 2], f64),
         goal: [f64; 2],
         period: f64,
         flags: &mut Flags,
@@ -53,7 +62,11 @@ impl Filter {
         let braked = steered([0.0; 2]);
         let wanted = dynamics.approach([goal[0] - half[0], goal[1] - half[1]], period);
         let next = steered(wanted);
-        let stop = rest(braked);
+        let mut stop = rest(braked);
+        // Noise that moves the place is no leave to go there: as often as it moves it on, it would go on.
+        if length([promised[0] - stop[0], promised[1] - stop[1]]) <= error {
+            stop = promised;
+        }
         // A member outside its cell goes no further out than it has to.
         let holds = |place: [f64; 2]| {
             let inside = |plane: &super::cell::HalfPlane| {

@@ -158,7 +158,7 @@ impl Limits {
     }
 
     /// The widening of a member's distances for its noise \[m\].
-    pub(super) fn margin(&self) -> f64 {
+    pub(in crate::swarm) fn margin(&self) -> f64 {
         3.0 * self.deviation
     }
 }

@@ -82,10 +82,12 @@
 //!
 //! # Noise
 //! With [`Limits::deviation`] everything is kept three deviations of each member farther away, and the ways on which
-//! members come to rest by three deviations of their ends more. Among members whose poses are not late that leaves the
-//! declared clearance in all of ten thousand random flights that begin with it. Two cases are not covered. In a gap
-//! between solids that is narrower than the widened distances the way out is undetermined, and noise leads a member
-//! deeper. Poses that are late as well carry the noise of several periods.
+//! members come to rest by three deviations of their ends more. Where that leaves a member no room, the place at which it
+//! was last sent to come to rest stands for the one at which it seems to come to rest by now: noise moves the second as
+//! often on as back, and a member that is already too near would follow it on each time and back never. That leaves the
+//! declared clearance in all of the random flights that begin with it, late poses or not (`tests/swarm_safety`). Not
+//! covered is a gap between solids that is narrower than the widened distances: the way out is undetermined, and noise
+//! leads a member deeper.
 //!
 //! # Lying members
 //! A pose that is farther from the last one than the speed limit allows, and half a metre of noise, is not accepted

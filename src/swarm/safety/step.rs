@@ -75,7 +75,10 @@ impl Filter {
             self.around(&request, here, member, &mut flags)
         };
         let step = match motion {
-            Some(Motion { velocity, .. }) if brakes => self.brakable(velocity, goal, period, &mut flags),
+            Some(Motion { velocity, .. }) if brakes => {
+                let promised = self.promised(seen, member);
+                self.brakable(velocity, promised, goal, period, &mut flags)
+            }
             Some(motion) => {
                 shortened(self.steered(motion, goal, period, (&request, origins), &mut flags), request.step)
             }

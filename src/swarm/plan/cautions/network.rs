@@ -1,6 +1,6 @@
 //! Warnings of what becomes of poses and ranges on their way, and of robots that are not heard.
 
-use super::super::{DEVIATIONS_KEPT, largest_noise};
+use super::super::{DEVIATIONS_KEPT, largest_noise, room_for_delay};
 use crate::flock::vectors::distance;
 use crate::scene::swarm::raw::{RawCommandKind, RawFaultKind, RawSwarm};
 use crate::swarm::flight::Flight;
@@ -41,7 +41,13 @@ pub fn of(raw: &RawSwarm, flight: &Flight) -> Vec<String> {
     let formation = flight.control().formation();
     let networks = networks(raw);
     let of_each = networks.iter().flat_map(|network| {
-        [network.noise(raw, formation), network.delay(raw), network.loss(), network.ranges(raw)]
+        [
+            network.noise(raw, formation),
+            network.delay(raw),
+            network.room(raw, flight),
+            network.loss(),
+            network.ranges(raw),
+        ]
     });
     let others = [silent(raw, flight), never_heard(raw, flight), unmeasured(raw, formation)];
     of_each.chain(others).flatten().collect()
@@ -73,6 +79,19 @@ impl Network {
                 "jitter makes some poses older than poses.age_limit: robots will be lost for periods at a time; lower \
                  flight.jitter{} or raise the limit",
                 if *key == "flight" { String::new() } else { format!(" or {key}.delay") }
+            )
+        })
+    }
+
+    /// Robots at their places that hold each other, as each may be anywhere within the speed limit.
+    fn room(&self, raw: &RawSwarm, flight: &Flight) -> Option<String> {
+        let room = room_for_delay(flight.control().formation(), flight.control().limits())?;
+        let late = f64::from(self.delay + self.jitter) * raw.control.period;
+        (late > room).then(|| {
+            format!(
+                "from poses {late:.3} s old robots at their places may be too near to each other, up to {room:.3} s they have \
+                 room: they will stand or wander; lower {}.delay or limits.speed, or space the robots out",
+                self.key
             )
         })
     }
