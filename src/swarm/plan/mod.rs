@@ -215,23 +215,24 @@ fn largest_noise(formation: &Formation, clearance: Option<f64>) -> Option<f64> {
     Some((free / (2.0 * DEVIATIONS_KEPT)).max(0.0))
 }
 
-/// Age of poses at which two robots at their places are perhaps too near \[s\]: each may be anywhere within the speed limit by then,
-/// and the line between the two is off by as much (see the docs of `swarm::safety`).
+/// Age of poses at which two robots at their places are perhaps too near \[s\].
 fn room_for_delay(formation: &Formation, limits: &Limits) -> Option<f64> {
+    let Formation { places, radii, .. } = formation;
+    let pairs = (0..formation.count()).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let room = |(i, j)| room_between(distance(places.get(i), places.get(j)), radii[i] + radii[j], limits);
+    pairs.map(room).reduce(|a: Option<f64>, b| Some(a?.min(b?))).flatten()
+}
+
+/// The same of two that are so far apart, with radii of so much together \[m\]: each may be anywhere within the speed limit by then,
+/// and the line between the two is off by as much (see the docs of `swarm::safety`).
+fn room_between(apart: f64, radii: f64, limits: &Limits) -> Option<f64> {
     if !limits.keeps_apart || limits.brakes || !limits.speed.is_finite() {
         return None;
     }
-    let Formation { places, radii, .. } = formation;
-    let room = |i: usize, j: usize| {
-        let (apart, keep) = (
-            distance(places.get(i), places.get(j)),
-            radii[i] + radii[j] + limits.clearance + 2.0 * limits.margin(),
-        );
-        // Where sqrt(apart^2 - off^2) = keep + off.
-        let off = 0.5 * ((2.0 * apart * apart - keep * keep).max(0.0).sqrt() - keep);
-        off.max(0.0) / (2.0 * limits.speed)
-    };
-    (0..formation.count()).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| room(i, j)).reduce(f64::min)
+    let keep = radii + limits.clearance + 2.0 * limits.margin();
+    // Where sqrt(apart^2 - off^2) = keep + off.
+    let off = 0.5 * ((2.0 * apart * apart - keep * keep).max(0.0).sqrt() - keep);
+    Some(off.max(0.0) / (2.0 * limits.speed))
 }
 
 /// The reason for which a period is no linear map, as far as the file shows it.

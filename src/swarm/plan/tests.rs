@@ -81,7 +81,11 @@ fn what_a_network_that_changes_and_commands_do_is_warned_of() {
     };
     let two = "flight.faults=[{ robot = \"robot_1\", at = 2.0, until = 9.0, what = { kind = \"stuck\" } }, \
                { robot = \"robot_1\", at = 5.0, what = { kind = \"dead\" } }]";
-    let cases: [(&[&str], &str); 9] = [
+    let cases: [(&[&str], &str); 10] = [
+        (
+            &["flight.delay=5"],
+            "behind poses 0.250 s old robots at their places have little room, and none behind poses of 0.269 s",
+        ),
         (
             &[two],
             "`robot_1` has one fault at a time: flight.faults[1] hides flight.faults[0] while both last",
@@ -111,9 +115,13 @@ fn what_a_network_that_changes_and_commands_do_is_warned_of() {
         let plan = plan("square", set);
         assert!(plan.cautions.iter().any(|caution| caution.contains(words)), "{words}: {plan}");
     }
-    for quiet in
-        [&[fault("until = 3.0, ").as_str()][..], &[ranges, "flight.noise=0.05"], &[&channel(0.01, 2, 0.5)]]
-    {
+    let late = &["flight.delay=4"];
+    for quiet in [
+        &[fault("until = 3.0, ").as_str()][..],
+        &[ranges, "flight.noise=0.05"],
+        &[&channel(0.01, 2, 0.5)],
+        late,
+    ] {
         assert_eq!(plan("square", quiet).cautions, Vec::<String>::new(), "{quiet:?}");
     }
 }

@@ -1,8 +1,9 @@
 //! Warnings of what becomes of poses and ranges on their way, and of robots that are not heard.
 
-use super::super::{DEVIATIONS_KEPT, largest_noise, room_for_delay};
+use super::super::{DEVIATIONS_KEPT, largest_noise, room_between, room_for_delay};
+use super::narrowest;
 use crate::flock::vectors::distance;
-use crate::scene::swarm::raw::{RawCommandKind, RawFaultKind, RawSwarm};
+use crate::scene::swarm::raw::{RawCommandKind, RawFaultKind, RawManoeuvre, RawSwarm};
 use crate::swarm::flight::Flight;
 use crate::swarm::formation::Formation;
 use crate::swarm::safety::Limits;
@@ -85,12 +86,22 @@ impl Network {
 
     /// Robots at their places that hold each other, as each may be anywhere within the speed limit.
     fn room(&self, raw: &RawSwarm, flight: &Flight) -> Option<String> {
-        let room = room_for_delay(flight.control().formation(), flight.control().limits())?;
+        /// Part of the room that is left to robots, which are nearer to each other than their places where one lags.
+        const LEFT: f64 = 0.75;
+        let (formation, limits) = (flight.control().formation(), flight.control().limits());
+        let of_manoeuvre = |one: &RawManoeuvre| {
+            let (free, i, j) = narrowest(formation, &formation.manoeuvre(&one.name, 0.0)?)?;
+            let radii = formation.radii[i] + formation.radii[j];
+            room_between(free + radii, radii, limits)
+        };
+        let room =
+            raw.manoeuvres.iter().filter_map(of_manoeuvre).fold(room_for_delay(formation, limits)?, f64::min);
         let late = f64::from(self.delay + self.jitter) * raw.control.period;
-        (late > room).then(|| {
+        (late > LEFT * room).then(|| {
             format!(
-                "from poses {late:.3} s old robots at their places may be too near to each other, up to {room:.3} s they have \
-                 room: they will stand or wander; lower {}.delay or limits.speed, or space the robots out",
+                "behind poses {late:.3} s old robots at their places have little room, and none behind poses of {room:.3} s, since \
+                 they may be anywhere within limits.speed: they may stand or wander; lower {}.delay or limits.speed, or space \
+                 the robots out",
                 self.key
             )
         })
