@@ -13,19 +13,35 @@ use flockform::material::report::MaterialReport;
 use super::Refusal;
 use super::names::{FileName, Overrides, SceneArguments};
 
+/// Options that say what a scene says. The changes to a scene conflict with them too: clap waives a requirement that
+/// what is given conflicts with.
+const WITHOUT_SCENE: [&str; 14] = [
+    "lattice",
+    "spacing",
+    "a",
+    "b",
+    "angle",
+    "orientation",
+    "neighbours",
+    "weights",
+    "young",
+    "poisson",
+    "shear",
+    "fiber_angle",
+    "plane",
+    "thickness",
+];
+
 /// A question: a scene's rule, a rule given by its lattice and weights, or a material given by its
 /// constants.
 #[derive(Debug, Args)]
-#[command(mut_arg("set", |set| set.requires("scene")))]
+#[command(mut_arg("set", |set| set.requires("scene").conflicts_with_all(WITHOUT_SCENE)))]
 pub struct MaterialArguments {
     /// Name of a bundled scene or path of a scene file whose rule to examine
     #[arg(
         value_parser = FileName::SCENE,
         hide_possible_values = true,
-        conflicts_with_all = [
-            "lattice", "spacing", "a", "b", "angle", "orientation", "neighbours", "weights",
-            "young", "poisson", "shear", "fiber_angle", "plane", "thickness",
-        ]
+        conflicts_with_all = WITHOUT_SCENE
     )]
     scene: Option<String>,
     #[command(flatten)]

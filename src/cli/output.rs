@@ -96,6 +96,7 @@ impl OutputArguments {
         if let Some(out) = &self.out {
             return create(out, self.force);
         }
+        let name = folder_name(name);
         let mut path = PathBuf::from(format!("out/{name}"));
         for n in 2.. {
             // Making it decides: another run may want the same name at this moment.
@@ -112,6 +113,12 @@ impl OutputArguments {
         }
         unreachable!("endless")
     }
+}
+
+/// The name of a scene or swarm as that of a folder below another: of `..toml` it is `.`, which names no folder of its own.
+fn folder_name(name: &str) -> String {
+    let name = name.replace(['/', '\\'], "-");
+    if name.chars().all(|c| c == '.') { "unnamed".into() } else { name }
 }
 
 /// Options that change nothing of a report, and whether a value follows.
@@ -153,6 +160,13 @@ pub fn command_line(arguments: impl IntoIterator<Item = String>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn results_lie_below_the_folder_of_all_whatever_the_file_is_called() {
+        let names = ["", ".", "..", "../up", "tension", "a.b"];
+        let folders = ["unnamed", "unnamed", "unnamed", "..-up", "tension", "a.b"];
+        assert_eq!(names.map(folder_name), folders);
+    }
 
     #[test]
     fn a_command_line_can_be_typed_again() {

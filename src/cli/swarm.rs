@@ -176,7 +176,8 @@ fn words(report: &FlightReport, seconds: f64, kept: &Path) -> String {
     let mut line = |name: &str, value: String| words += &format!("  {name:<33}  {value}\n");
     report.facts(number).into_iter().for_each(|(name, value)| line(name, value));
     line("PE1", format!("largest {:.4e} m^2, at the end {:.4e} m^2", report.pe1[0], report.pe1[1]));
-    line("Strain", format!("largest {:.4e}, at the end {:.4e}", report.strain[0], report.strain[1]));
+    let strain = report.strain.map(|[largest, last]| format!("largest {largest:.4e}, at the end {last:.4e}"));
+    line("Strain", strain.unwrap_or_else(|| "not defined: no robot has neighbours in two directions".into()));
     for verdict in &report.bounds {
         let found = verdict.found.map_or("not measured".into(), |found| format!("{found:.4e}"));
         let worst = verdict.worst.as_ref().filter(|_| !verdict.holds);

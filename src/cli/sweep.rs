@@ -190,6 +190,9 @@ impl Sweep {
     fn ends(&self) -> String {
         let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
         self.rows.values().for_each(|row| *counts.entry(&row.stop_reason).or_default() += 1);
+        if counts.is_empty() {
+            return "no runs: this shard has none of the study's".into();
+        }
         let runs = counted(self.rows.len(), "run");
         let counts: Vec<(&str, usize)> = counts.into_iter().collect();
         if let [(reason, count)] = counts[..] {

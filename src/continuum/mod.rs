@@ -9,6 +9,7 @@ mod active_share;
 mod among;
 pub mod builder;
 pub mod bulk_response;
+pub(crate) mod cuts;
 mod damping;
 pub mod deviation;
 pub mod digest;

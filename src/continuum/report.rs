@@ -4,6 +4,7 @@ use std::fmt;
 
 use super::active_share::active_share;
 use super::bulk_response;
+use super::cuts;
 use super::deviation::{Deviation, pieces};
 use super::edge_stress;
 use super::equilibrium::select_solver;
@@ -281,6 +282,7 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
     cautions.extend(dead_pressure(scene));
     cautions.extend(uneven_sides(scene));
     cautions.extend(late::cautions(scene));
+    cautions.extend(cuts::planned(scene, &plan.setup.body, &plan.setup.flock.neighbours));
     if let (Some(edge), Some(cells)) = (&plan.setup.free_edge, &plan.setup.cells) {
         let body = &plan.setup.body;
         cautions.extend(edge_stress::cautions(edge.of(body, cells), (body, cells), |own| own));

@@ -11,9 +11,10 @@ use crate::engine::shared::{Agreed, NotShared};
 use crate::engine::state::{EngineState, WrongState};
 use crate::flock::law::Weights;
 use crate::flock::role::Role;
-use crate::flock::rules::{FeedbackReference, Mean};
+use crate::flock::rules::{Axis, FeedbackReference, Mean};
 use crate::geometry::point::{dot, minus};
 use crate::ranks::Team;
+use crate::scene::text::number;
 use crate::scene::{Scene, SceneError, Stop};
 use crate::solve::equilibrium::Solved;
 use crate::sweep::Order;
@@ -302,6 +303,18 @@ fn cause_in_sweep(engine: &Engine) -> Option<String> {
         return Some(format!("damping = {damping} overshoots every target; use at most 1"));
     }
     if let Some(poisson) = rule.poisson {
+        let (low, high) = engine.body().bounds();
+        let (across, name) = match poisson.axis {
+            Axis::X => (1, "y"),
+            Axis::Y => (0, "x"),
+        };
+        if !(low[across]..=high[across]).contains(&poisson.centre) {
+            return Some(format!(
+                "the Poisson term grows with the distance from its centre, {name} = {}, which lies outside the body; leave \
+                 rule.poisson.centre out",
+                number(poisson.centre)
+            ));
+        }
         return Some(format!("the Poisson term adds K = {} at every step; use a smaller K", poisson.k));
     }
     let is_synchronous = engine.update().order == Order::Synchronous;

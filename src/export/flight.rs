@@ -109,7 +109,7 @@ pub(super) fn charts(record: &Record, report: &FlightReport) -> Vec<Chart> {
             &report.title,
             "largest distance of a robot from its place",
             [time(), Axis::log("distance", "m")],
-            shape.into_iter().chain(bounds).filter(visible).collect(),
+            shape.iter().cloned().chain(bounds).filter(visible).collect(),
         ));
     }
     if !clearance.points.is_empty() {
@@ -121,12 +121,12 @@ pub(super) fn charts(record: &Record, report: &FlightReport) -> Vec<Chart> {
         ));
     }
     if charts.is_empty() {
-        let strain = series("", SERIES[3], &|s| Some(s.strain));
+        // A robot alone, which is where it should be.
         charts.push(Chart::new(
             &report.title,
-            "largest strain of a robot's surroundings",
-            [time(), Axis::new("strain", "1")],
-            vec![strain],
+            "largest distance of a robot from its place",
+            [time(), Axis::new("distance", "m")],
+            shape.into_iter().filter(|s| !s.points.is_empty()).collect(),
         ));
     }
     charts

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::error::{ExportError, write_file};
 use super::{OutputFolder, bonds, largest_strain};
+use crate::continuum::cuts;
 use crate::continuum::late;
 use crate::continuum::layout::regions::uneven_sides;
 use crate::continuum::mechanics::{Mechanics, Peak, Stresses, percent};
@@ -293,6 +294,7 @@ fn cautions(scene: &Scene, engine: &Engine, measured: Option<&Measured>) -> Vec<
     uneven_sides(scene)
         .into_iter()
         .chain(late::cautions(scene))
+        .chain(cuts::made(scene, engine))
         .chain(measured.map(of_forces).into_iter().flatten())
         .collect()
 }

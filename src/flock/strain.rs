@@ -45,9 +45,13 @@ pub(crate) fn strain_among(
 /// From places in the reference configuration and at present, of the particle and of its neighbours.
 fn of_pairs(own: ([f64; 2], [f64; 2]), pairs: impl Iterator<Item = ([f64; 2], [f64; 2])>) -> Option<Strain> {
     let (mut then_then, mut now_then) = ([0.0; 3], [[0.0; 2]; 2]);
+    let mut unit = None;
     for (reference, present) in pairs {
         let then = [reference[0] - own.0[0], reference[1] - own.0[1]];
         let now = [present[0] - own.1[0], present[1] - own.1[1]];
+        // Products of four distances stay in range in a unit of their size.
+        let unit = *unit.get_or_insert_with(|| inverse_size(then));
+        let [then, now] = [then, now].map(|[x, y]| [unit * x, unit * y]);
         then_then[0] += then[0] * then[0];
         then_then[1] += then[1] * then[1];
         then_then[2] += then[0] * then[1];
@@ -70,6 +74,13 @@ fn of_pairs(own: ([f64; 2], [f64; 2]), pairs: impl Iterator<Item = ([f64; 2], [f
     let u = super::block::product(&[[cos, sin], [-sin, cos]], &f);
     let components = [u[0][0] - 1.0, u[1][1] - 1.0, 0.5 * (u[0][1] + u[1][0])];
     components.iter().all(|c| c.is_finite()).then_some(Strain { components, rotation })
+}
+
+/// The inverse of a vector's size, roughly: a power of two, by which a product keeps its digits.
+fn inverse_size([x, y]: [f64; 2]) -> f64 {
+    let exponent = x.abs().max(y.abs()).to_bits() >> 52;
+    // The largest exponents have no inverse that is a normal number.
+    f64::from_bits((2046 - exponent.clamp(1, 2045)) << 52)
 }
 
 #[cfg(test)]
@@ -98,6 +109,27 @@ mod tests {
         assert!((found.largest() - 0.2).abs() < 1e-14);
         let sheared = of(|[x, y]| [x + 0.02 * y, y]).expect("spanned");
         assert!((sheared.components[2] - 0.01).abs() < 1e-4 && (sheared.rotation + 0.01).abs() < 1e-4);
+    }
+
+    #[test]
+    fn the_unit_of_lengths_is_of_no_account_to_the_last_bit() {
+        let own = [2.0, 2.0];
+        let in_units = |unit: f64, around: &[[f64; 2]]| {
+            let sheared = |[x, y]: [f64; 2]| [1.1 * x + 0.02 * y, 0.8 * y];
+            let pair = |at: [f64; 2]| (at.map(|x| unit * x), sheared(at).map(|x| unit * x));
+            of_pairs(pair(own), around.iter().map(|&at| pair(at)))
+        };
+        let ordinary = in_units(1.0, &AROUND).expect("spanned");
+        for exponent in [-498, -280, 1, 259, 498] {
+            let unit = 2.0_f64.powi(exponent);
+            assert_eq!(in_units(unit, &AROUND), Some(ordinary), "1e{:.0}", unit.log10());
+            assert_eq!(in_units(unit, &[[3.0, 3.0], [1.0, 1.0]]), None);
+        }
+        for unit in [1e-152, 1e-150, 1e-82, 1e78, 1e80, 1e150, 1e152] {
+            let found = in_units(unit, &AROUND).expect("spanned");
+            let apart = (0..3).map(|k| (found.components[k] - ordinary.components[k]).abs());
+            assert!(apart.fold(0.0, f64::max) < 1e-14, "{unit:e}: {found:?}");
+        }
     }
 
     #[test]

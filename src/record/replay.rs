@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::topics::{Heard, stamped, topics};
+use super::topics::{Heard, of_robots, stamped, topics};
 use super::{Entry, Reader, RecordError};
 use crate::flock::vectors::distance;
 use crate::messages::builtin_interfaces::Time;
@@ -107,7 +107,7 @@ pub fn recorded_swarm(reader: &Reader, set: &[String]) -> Result<Swarm, RecordEr
 /// Replays a recording with this swarm.
 ///
 /// # Errors
-/// A recording that has no poses or no targets of this swarm's robots.
+/// A recording of other topics than this swarm's, or of a loop that was not at work.
 pub fn replay(reader: &Reader, swarm: &Swarm, tolerance: f64) -> Result<Report, RecordError> {
     let mut replay = Replay::new(reader, swarm, tolerance)?;
     let damage = reader.each(&mut |entry| replay.see(entry))?;
@@ -122,12 +122,20 @@ pub fn replay(reader: &Reader, swarm: &Swarm, tolerance: f64) -> Result<Report, 
     if let Some(refusal) = replay.refusal {
         return unusable(&refusal, "give the swarm file that was flown with --swarm");
     }
-    let help = "its topics are not those that the swarm file's [node] names; give another --swarm, or --set node.pose_topic=...";
-    if replay.poses == 0 {
-        return unusable("it has no poses of this swarm's robots", help);
-    }
-    if replay.robots.iter().all(|robot| robot.recorded == 0) {
-        return unusable("it has no targets of this swarm's robots", help);
+    let help = if replay.has_topics {
+        "its topics are this swarm's, but the loop was not at work: record it for longer"
+    } else {
+        "its topics are not those that the swarm file's [node] names; give another --swarm, or --set node.pose_topic=..."
+    };
+    let has_targets = replay.robots.iter().any(|robot| robot.recorded > 0);
+    // A loop at work that gets no pose, or believes none, sends no target.
+    if !(replay.has_topics && replay.ticks > 0) {
+        if replay.poses == 0 {
+            return unusable("it has no poses of this swarm's robots", help);
+        }
+        if !has_targets {
+            return unusable("it has no targets of this swarm's robots", help);
+        }
     }
     Ok(Report {
         recording: reader.path().to_owned(),
@@ -147,6 +155,8 @@ struct Replay {
     /// The parameters that the file and the overrides of the recording gave.
     as_recorded: Vec<(&'static str, f64)>,
     topics: BTreeMap<String, Heard>,
+    /// Whether the loop that was recorded had the same topics, with messages or without.
+    has_topics: bool,
     frame_id: String,
     heard_of: Vec<usize>,
     mine: Vec<bool>,
@@ -179,10 +189,8 @@ impl Replay {
     fn new(reader: &Reader, swarm: &Swarm, tolerance: f64) -> Result<Self, RecordError> {
         let described = reader.described()?;
         let mut control = Control::new(swarm)?;
-        let before = match &described.swarm {
-            Some(_) => Control::new(&recorded_swarm(reader, &[])?)?,
-            None => control.clone(),
-        };
+        let flown = described.swarm.as_ref().map(|_| recorded_swarm(reader, &[])).transpose()?;
+        let before = flown.as_ref().map_or_else(|| Ok(control.clone()), Control::new)?;
         let count = control.formation().count();
         let member = described.metadata.get("member").and_then(|name| control.formation().number(name));
         let heard_of = member.map_or((0..count).collect(), |m| scope::heard(swarm, &control, m));
@@ -194,6 +202,10 @@ impl Replay {
             names = names.of_robot(member)?;
         }
         let (topics, has_events) = topics(reader, swarm, &control, &names)?;
+        let has_topics = match &flown {
+            Some(flown) => of_robots(flown, &before, &names)?.keys().all(|topic| topics.contains_key(topic)),
+            None => false,
+        };
         let is_simulated = described.metadata.get("source").is_some_and(|source| source == "swarm");
         let commands = if is_simulated { commands::of(swarm, &control)? } else { Vec::new() };
         let robot = |name: &String| RobotDifference { name: name.clone(), ..RobotDifference::default() };
@@ -208,6 +220,7 @@ impl Replay {
             fresh: control.clone(),
             control,
             topics,
+            has_topics,
             heard_of,
             tolerance,
             has_events,

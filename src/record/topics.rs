@@ -44,7 +44,6 @@ pub(super) fn topics(
     control: &Control,
     names: &Names,
 ) -> Result<(BTreeMap<String, Heard>, bool), RecordError> {
-    let raw = &swarm.raw.node;
     let leaf = EVENTS.trim_start_matches('~');
     let mut topics = BTreeMap::new();
     reader.each(&mut |entry| {
@@ -53,6 +52,18 @@ pub(super) fn topics(
         }
     })?;
     let has_events = !topics.is_empty();
+    topics.extend(of_robots(swarm, control, names)?);
+    Ok((topics, has_events))
+}
+
+/// The topics of a swarm's robots and leaders, whether a recording has messages of them or not.
+pub(super) fn of_robots(
+    swarm: &Swarm,
+    control: &Control,
+    names: &Names,
+) -> Result<BTreeMap<String, Heard>, RecordError> {
+    let raw = &swarm.raw.node;
+    let mut topics = BTreeMap::new();
     if raw.pose_type == RawPoseType::PoseArray {
         topics.insert(names.fleet_topic(&raw.pose_topic)?, Heard::Poses);
     }
@@ -70,5 +81,5 @@ pub(super) fn topics(
         topics.insert(of(&raw.ranges_topic)?, Heard::Ranges(m));
         topics.insert(of(target)?, Heard::Target(m));
     }
-    Ok((topics, has_events))
+    Ok(topics)
 }

@@ -15,6 +15,19 @@ pub fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
+/// From here on numbers are written with a power of ten: their digits would say nothing.
+const LONG: f64 = 1e15;
+
+/// A number as it is, or with a power of ten if it would be hundreds of digits long.
+pub fn number(value: f64) -> String {
+    if value.abs() < LONG { value.to_string() } else { format!("{value:e}") }
+}
+
+/// The same to so many decimal places.
+pub fn decimals(value: f64, places: usize) -> String {
+    if value.abs() < LONG { format!("{value:.places$}") } else { format!("{value:.places$e}") }
+}
+
 /// The text of a file of at most one GiB, so that a device without end, or another program's data, is refused and
 /// does not fill the memory.
 ///
@@ -86,6 +99,12 @@ pub fn nearest<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_of_hundreds_of_digits_have_a_power_of_ten() {
+        assert_eq!([1.5, -3.0, 1e300, f64::INFINITY].map(number), ["1.5", "-3", "1e300", "inf"]);
+        assert_eq!([1.5, -3.0, 1e300].map(|x| decimals(x, 3)), ["1.500", "-3.000", "1.000e300"]);
+    }
 
     #[test]
     fn a_file_as_long_as_allowed_is_read_and_a_longer_one_refused() {

@@ -227,6 +227,10 @@ fn options_that_make_no_question_are_refused_with_the_remedy() {
         let value = if option == "--plane" { "strain" } else { "-7" };
         refused(&["tension", &format!("{option}={value}")], &["cannot be used with", option]);
     }
+    for set in ["garbage", "rule.nosuch=1", "neighbours={kind=\"chebyshev\",radius=1}"] {
+        refused(&["--lattice", "square", "--set", set], &["--set", "cannot be used with", "--lattice"]);
+    }
+    refused(&["--set", "lattice.spacing=2"], &["SCENE"]);
     refused(&["--lattice", "sqare"], &["square"]);
     refused(&["--lattice", "square", "--neighbours", "first:3"], &["not symmetric", "opposite neighbours"]);
     refused(&["--lattice", "square", "--neighbours", "nearest"], &["`nearest`", "first, first:3"]);

@@ -148,6 +148,20 @@ fn a_run_that_diverges_fails_names_the_cause_and_keeps_the_last_good_state() {
     assert!(!table.contains("NaN") && !table.contains("inf"));
 }
 
+#[test]
+fn a_poisson_term_that_diverges_by_its_centre_is_blamed_on_that() {
+    let folder = temporary();
+    let arguments =
+        ["run", "tension", "--no-report", "--out", "o", "--set", "rule.poisson={k=-0.3,centre=1e9}"];
+    let output = flockform(&arguments, folder.path());
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    let said = text(&output.stdout);
+    assert!(
+        said.contains("= 1000000000, which lies outside the body; leave rule.poisson.centre out"),
+        "{said}"
+    );
+}
+
 /// Starts a run that would go on for minutes.
 fn long_run(folder: &Path) -> std::process::Child {
     let arguments = ["run", "tension", "--out", "o", "--set", "stop.steps=100000000", "--set", "record={}"];
@@ -352,6 +366,11 @@ fn rules_that_contradict_themselves_are_refused() {
     refused_with("lattice-honeycomb", &["neighbours={kind=\"chebyshev\",radius=1}"], &["honeycomb"]);
     refused_with("lattice-hexagonal", &["neighbours={kind=\"offsets\",offsets=[[1,0]]}"], &["no site"]);
     refused_with("tension", &["rule.weights={kind=\"list\",values=[1,1,-1,-1]}"], &["add up to 0"]);
+    let huge = "rule.weights={kind=\"list\",values=[1e308,1e308,1e308,1e308]}";
+    refused_with("tension", &[huge], &["too large", "smaller"]);
+    let own = "neighbours={kind=\"offsets\",offsets=[[1,0],[0,0]]}";
+    refused_with("tension", &[own], &["neighbours.offsets[1]", "not its own neighbour"]);
+    refused_with("tension", &["unit=\"\""], &["unit", "at least 1 character"]);
     refused_with("tension", &["rule.weights={kind=\"list\",values=[1,1]}"], &["2 weights", "4 neighbours"]);
     refused_with("tension", &["rule.mean={kind=\"power\",exponent=0}"], &["geometric"]);
     refused_with("drop", &["frame=lagged"], &["found anew at every step"]);
@@ -456,6 +475,40 @@ fn what_comes_after_the_last_step_is_warned_of_by_the_plan_and_the_run() {
         said.contains("beyond the last increment, 4, and without effect: record.figures[1] = 5;"),
         "{said}"
     );
+}
+
+#[test]
+fn cuts_that_miss_the_body_are_warned_of_by_the_plan_and_the_run() {
+    let folder = temporary();
+    let set = [
+        "stop.steps=5",
+        "cuts=[{ from = [6.5, -5.0], to = [6.5, 3.0] }, { from = [90.0, 90.0], to = [91.0, 91.0] }]",
+        "actions=[{ at = 2, what = { kind = \"cut\", from = [3.5, -5.0], to = [3.5, 3.0] } },\
+         { at = 3, what = { kind = \"cut\", from = [90.0, 90.0], to = [91.0, 91.0] } }]",
+    ];
+    let set: Vec<&str> = set.iter().flat_map(|text| ["--set", *text]).collect();
+    let run = ["run", "tension", "--no-report", "--figures", "none", "--out", "o"];
+    let unless = "the cut of actions[1] where the body begins: without effect unless the body has moved there by step 3\n";
+    let idle = "no bond crosses the cut of actions[1], which is without effect: lay it through the body\n";
+    for (command, of_action) in [(&["plan", "tension"][..], unless), (&run[..], idle)] {
+        let said = run_in(folder.path(), &[command, &set].concat());
+        assert!(said.contains("caution: no bond crosses cuts[1], which is without effect"), "{said}");
+        assert!(said.contains(of_action), "{said}");
+        assert!(!said.contains("cuts[0]") && !said.contains("actions[0]"), "{said}");
+    }
+}
+
+#[test]
+fn a_strain_that_is_not_defined_is_none() {
+    const ROW: &str = "title = \"t\"\nframe = \"none\"\nlattice = { kind = \"square\", spacing = 1.0 }\n\
+        body = { shape = { kind = \"grid\", columns = 6, rows = 1 } }\nstop = { steps = 3 }\n\
+        roles = [{ role = \"leader\", region = { kind = \"ids\", ids = [6] }, \
+        motion = { kind = \"velocity\", per_step = [0.1, 0.0] } }]\n";
+    let folder = temporary();
+    std::fs::write(folder.path().join("row.toml"), ROW).expect("written");
+    let said = run_in(folder.path(), &["run", "row.toml", "--out", "o"]);
+    assert!(said.contains("strain not defined: no particle has neighbours in two directions\n"), "{said}");
+    assert!(json_in(&folder.path().join("o/summary.json"))["energies"]["largest_strain"].is_null());
 }
 
 #[test]

@@ -81,6 +81,28 @@ fn the_map_clips_the_fence_and_draws_every_robot_to_scale() {
     assert!((a / c - 4.0).abs() < 0.02 && (a / b - 8.0).abs() < 0.02, "{radii:?}");
 }
 
+/// A line of robots that leaders stretch has neighbours in one direction alone.
+#[test]
+fn a_strain_that_is_not_defined_is_left_out() {
+    const LINE: &str = "title = \"t\"\nlinks = { kind = \"nearest\", count = 2 }\n\
+        robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [1.0, 0.0] },\n\
+        { name = \"c\", place = [2.0, 0.0] }]\n\
+        leaders = [{ robots = [\"a\"], program = { kind = \"external\" } }, { robots = [\"c\"], program = \
+        { kind = \"path\", points = [{ at = 1.0, displacement = [2.0, 0.0] }] } }]\n\
+        flight = { duration = 2.0 }\n";
+    let folder = temporary();
+    write(folder.path().join("line.toml"), LINE).expect("written");
+    let output = flockform(&["swarm", "line.toml", "--out", "out"], folder.path());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let said = text(&output.stdout);
+    assert!(said.contains("not defined: no robot has neighbours in two directions"), "{said}");
+    assert!(json_in(&folder.path().join("out/flight.json"))["strain"].is_null());
+    let samples = read_to_string(folder.path().join("out/samples.csv")).expect("written");
+    let mut rows = samples.lines().map(|row| row.split(',').collect::<Vec<_>>());
+    let column = rows.next().expect("a header").iter().position(|name| *name == "strain").expect("there");
+    assert!(rows.all(|row| row[column].is_empty()), "{samples}");
+}
+
 #[test]
 fn a_broken_bound_ends_with_exit_code_1_and_all_is_written() {
     let folder = temporary();
@@ -94,12 +116,16 @@ fn a_broken_bound_ends_with_exit_code_1_and_all_is_written() {
 #[test]
 fn what_cannot_fly_is_refused_with_exit_code_2_and_nothing_is_left() {
     let folder = temporary();
-    let cases: [(&[&str], &str); 7] = [
+    let cases: [(&[&str], &str); 8] = [
         (&["swarm", "liar"], "the nearest bundled swarm is `faulty-robot`"),
         (&["swarm", "square", "--set", "ranges.max_liars=1"], "it is called `max_faulty` now"),
         (&["swarm", "sqare"], "the nearest bundled swarm is `square`"),
         (&["swarm", "nothing.toml"], "cannot be read"),
         (&["swarm", "square", "--set", "limits.speed=-1"], "--set limits.speed=-1: limits.speed = -1"),
+        (
+            &["swarm", "square", "--set", "limits.clearance=1e300"],
+            "their radii and the clearance need 1e300 m",
+        ),
         (&["swarm", "square", "--set", "limits.sped=1"], "known keys: `speed`"),
         (
             &["swarm", "square", "--set", "flight.start=[{ robot = \"nobody\", place = [0.0, 0.0] }]"],

@@ -197,6 +197,8 @@ fn the_last_line_says_how_the_runs_ended() {
     assert!(words.contains("tension: 2 runs, all ended at stop.steps, "), "{words}");
     let words = of(&["--set", "stop.steps=100000", "--set", "stop.tolerance=1e-3"]);
     assert!(words.contains("tension: 2 runs, all came to equilibrium, "), "{words}");
+    let words = of(&["--set", "stop.steps=3", "--shard", "4/5"]);
+    assert!(words.contains("tension: no runs: this shard has none of the study's, "), "{words}");
 }
 
 #[test]

@@ -38,6 +38,21 @@ fn a_recorded_flight_replays_to_the_bit_whatever_its_robots_suffer() {
 }
 
 #[test]
+fn a_flight_whose_robots_are_never_heard_replays_too() {
+    for network in ["flight.loss=1.0", "flight.delay=60"] {
+        let folder = temporary();
+        let short = ["--set", "flight.duration=5.0", "--set", "flight.bounds={}"];
+        record(&[&["square", "--set", network], &short[..]].concat(), folder.path());
+        let report = replay_file(&folder.path().join("flight.mcap"), None, &[], 0.0).expect("readable");
+        assert!(report.holds() && report.ticks >= 100, "{network}: {report:?}");
+        assert!(report.robots.iter().all(|robot| robot.recorded == 0), "{network}: {:?}", report.robots);
+        let elsewhere = ["--set", "node.pose_topic=elsewhere/{name}", "--set", "node.target_topic=to/{name}"];
+        let said = says(2, &[&["replay", "flight.mcap"], &elsewhere[..]].concat(), folder.path());
+        assert!(said.contains("its topics are not those"), "{network}: {said}");
+    }
+}
+
+#[test]
 fn a_changed_rule_is_told_robot_by_robot() {
     let folder = temporary();
     record(&["square", "--set", "flight.duration=5.0", "--set", "flight.bounds={}"], folder.path());

@@ -42,11 +42,12 @@ pub fn closing_words(scene: &Scene, outcome: &Outcome, summary: &Summary, elapse
             phases.join(", ")
         );
     }
+    let strain = summary.energies.largest_strain.map(|strain| format!("largest strain {strain:.4e}"));
     words += &format!(
-        "PE1 {:.4e} {unit}^2 in all, largest strain {:.4e}\n",
+        "PE1 {:.4e} {}^2 in all, {}\n",
         summary.energies.pe1,
-        summary.energies.largest_strain.unwrap_or(0.0),
-        unit = scene.unit(),
+        scene.unit(),
+        strain.unwrap_or_else(|| "strain not defined: no particle has neighbours in two directions".into()),
     );
     let broken: Vec<_> = engine.breaks().iter().filter(|b| b.step > 0).collect();
     if let (Some(first), Some(last)) = (broken.first(), broken.last()) {

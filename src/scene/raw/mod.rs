@@ -35,10 +35,12 @@ pub struct RawScene {
     pub notes: String,
     /// Name of the unit of length, for axes and tables.
     #[serde(default = "defaults::unit")]
+    #[schemars(length(min = 1))]
     pub unit: String,
     /// Name of the unit of stress, in which Young's modulus and tractions are given, for axes and tables. With
     /// that of length it gives the unit of force: "Pa" and "m" give N, "MPa" and "mm" too.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1))]
     pub stress_unit: Option<String>,
     /// The lattice from which the body is cut; a body of points has none.
     #[serde(default)]

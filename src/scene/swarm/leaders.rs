@@ -124,8 +124,13 @@ fn track(text: &str, scale: f64) -> Result<Program, String> {
             tracks.len() - 1
         });
         let frames = &mut tracks[place].1;
-        if frames.last().is_some_and(|before| before.step >= frame.step) || frame.step < 0.0 {
-            return Err(format!("line {}: t = {} is not later than the row before it", row.line, frame.step));
+        let fault = match frames.last() {
+            _ if frame.step < 0.0 => Some("is negative: a program begins at t = 0"),
+            Some(before) if before.step >= frame.step => Some("is not later than the row before it"),
+            _ => None,
+        };
+        if let Some(fault) = fault {
+            return Err(format!("line {}: t = {} {fault}", row.line, frame.step));
         }
         frames.push(frame);
         Ok(())
@@ -164,6 +169,7 @@ mod tests {
         let error = |text| track(text, 1.0).expect_err("refused");
         assert_eq!(error("t,dx,dy\n0,nan,0\n"), "line 2: `dx` = `nan` is not a finite number");
         assert_eq!(error("t,dx,dy\n1,0,0\n1,0,0\n"), "line 3: t = 1 is not later than the row before it");
+        assert_eq!(error("t,dx,dy\n-3,0,0\n"), "line 2: t = -3 is negative: a program begins at t = 0");
         assert_eq!(error("t,dx,dy\n"), "the file has no rows");
         assert_eq!(error("x,y\n"), "line 1: the header is `x,y`");
         assert_eq!(error("t,dx,dy\n0,0,0\n\n\n1,oops,0"), "line 5: `dx` = `oops` is not a finite number");

@@ -131,6 +131,7 @@ pub(super) fn validate(
     let elastic = raw.material.as_ref().map(|raw| material::elastic(raw, "material", refuse)).transpose()?;
     let inclusions = material::inclusions(&raw, elastic.as_ref(), refuse)?;
     let farthest = crate::scene::farthest_seeing(elastic.as_ref(), &inclusions);
+    require_others(&raw, refuse)?;
     let neighbourhood = material::neighbourhood(&raw, &lattice, farthest);
     let equilibrium = equilibrium::equilibrium(&raw, refuse)?;
     let load_steps = load_steps::load_steps(&raw, refuse)?;
@@ -342,6 +343,14 @@ fn frame(raw: RawFrame) -> Option<FrameRule> {
     }
 }
 
+/// A particle would be a neighbour of itself by such an offset.
+fn require_others(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
+    let Some(RawNeighbours::Offsets { offsets }) = &raw.neighbours else { return Ok(()) };
+    let Some(k) = offsets.iter().position(|offset| *offset == [0, 0]) else { return Ok(()) };
+    let message = "[0, 0] is the particle itself, which is not its own neighbour".into();
+    Err(refuse(&format!("neighbours.offsets[{k}]"), message, "leave it out"))
+}
+
 fn neighbourhood(raw: &RawNeighbours, lattice: &Lattice, elastic: Option<&Elastic>) -> Neighbourhood {
     match raw {
         RawNeighbours::First { keep } => Neighbourhood::First { keep: *keep },
@@ -455,6 +464,14 @@ fn weights(raw: &Option<RawWeights>, refuse: Refuse<'_>) -> Result<Option<Weight
         Some(RawWeights::List { values }) => {
             // Also refuses a sum that is nothing but rounding, whose mean would be noise.
             let (sum, size) = values.iter().fold((0.0, 0.0), |(s, a), v| (s + v, a + f64::abs(*v)));
+            if !f64::is_finite(size) {
+                let message = "the weights are too large to be added up".into();
+                return Err(refuse(
+                    "rule.weights.values",
+                    message,
+                    "give smaller ones: only their ratios count",
+                ));
+            }
             if sum.abs() <= 1e-12 * size {
                 let message = format!("the weights add up to {sum}: no mean can be taken with them");
                 return Err(refuse("rule.weights.values", message, "give weights with a sum other than 0"));

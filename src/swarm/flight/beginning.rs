@@ -4,6 +4,7 @@ use super::Flight;
 use crate::flock::vectors::distance;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
+use crate::scene::text::decimals;
 
 /// An overlap below this is rounding \[m\].
 const ROUNDING: f64 = 1e-9;
@@ -20,9 +21,10 @@ pub fn require_free(swarm: &Swarm, flight: &Flight) -> Result<(), SceneError> {
         let overlap = formation.radii[m] - obstacles.distance(places.get(m));
         if overlap > ROUNDING {
             let message = format!(
-                "`{}` starts at {:?}, {overlap:.3} m deep in an obstacle",
+                "`{}` starts at {:?}, {} m deep in an obstacle",
                 formation.names[m],
-                places.get(m)
+                places.get(m),
+                decimals(overlap, 3)
             );
             let help = "move the obstacle, or start the robot elsewhere: flight.start";
             return Err(swarm.refuse(&key(swarm, &formation.names[m], m), message, help));
@@ -38,9 +40,9 @@ pub fn require_free(swarm: &Swarm, flight: &Flight) -> Result<(), SceneError> {
             let needed = formation.radii[i] + formation.radii[j];
             if apart < needed - ROUNDING {
                 let [first, second] = [i, j].map(|m| &formation.names[m]);
-                let message = format!(
-                    "`{first}` starts {apart:.3} m from `{second}`, and their radii need {needed:.3} m"
-                );
+                let [apart, needed] = [apart, needed].map(|length| decimals(length, 3));
+                let message =
+                    format!("`{first}` starts {apart} m from `{second}`, and their radii need {needed} m");
                 return Err(swarm.refuse(&key(swarm, first, i), message, "start the robots farther apart"));
             }
         }

@@ -23,8 +23,8 @@ pub struct Sample {
     pub continuum_error: Option<f64>,
     /// Sum of PE1 over the members \[m^2\].
     pub pe1: f64,
-    /// Largest strain of a member's surroundings \[1\].
-    pub strain: f64,
+    /// Largest strain of a member's surroundings \[1\]; absent where no member has neighbours in two directions.
+    pub strain: Option<f64>,
     /// Members whose pose is too old to be used, from each one's first pose on.
     pub lost: usize,
 }
@@ -115,7 +115,7 @@ impl Record {
             clearance,
             continuum_error: error(continuum),
             pe1: measures.pe1.iter().sum(),
-            strain: measures.strain.iter().flatten().map(|s| s.largest()).fold(0.0, f64::max),
+            strain: measures.strain.iter().flatten().map(|s| s.largest()).reduce(f64::max),
             lost: (0..formation.count()).filter(|&m| flight.is_lost(m)).count(),
         };
         self.farthest.push([affine.flatten(), rest.flatten(), continuum.flatten()]);

@@ -4,6 +4,8 @@ use std::fmt;
 
 use serde::Serialize;
 
+use crate::scene::text::decimals;
+
 /// A moment of a flight.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Moment {
@@ -20,7 +22,8 @@ pub struct Moment {
 impl fmt::Display for Moment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { robots, time, x, y } = self;
-        write!(f, "{} at {time:.2} s near ({x:.2}, {y:.2}) m", robots.join(" and "))
+        let [x, y] = [*x, *y].map(|coordinate| decimals(coordinate, 2));
+        write!(f, "{} at {time:.2} s near ({x}, {y}) m", robots.join(" and "))
     }
 }
 

@@ -54,8 +54,8 @@ pub struct FlightReport {
     pub continuum_error: Option<f64>,
     /// Largest sum of PE1, and at the end \[m^2\].
     pub pe1: [f64; 2],
-    /// Largest strain, and at the end \[1\].
-    pub strain: [f64; 2],
+    /// Largest strain, and at the end \[1\]; absent where no member has neighbours in two directions.
+    pub strain: Option<[f64; 2]>,
     /// Mean and longest way of a robot.
     pub way: [f64; 2],
     /// Most robots that were lost at one time.
@@ -191,7 +191,7 @@ impl FlightReport {
             acceleration: record.accelerations.as_ref().and_then(|one| one.report(&formation.names)),
             continuum_error: largest_and_last(samples, |s| s.continuum_error).map(|[largest, _]| largest),
             pe1: largest_and_last(samples, |s| Some(s.pe1)).unwrap_or_default(),
-            strain: largest_and_last(samples, |s| Some(s.strain)).unwrap_or_default(),
+            strain: largest_and_last(samples, |s| s.strain),
             way: [
                 record.ways.iter().sum::<f64>() / record.ways.len().max(1) as f64,
                 record.ways.iter().copied().fold(0.0, f64::max),

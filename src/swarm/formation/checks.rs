@@ -4,6 +4,7 @@ use super::Formation;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
+use crate::scene::text::number;
 
 /// Robots that a message names.
 const MOST_NAMED: usize = 6;
@@ -94,8 +95,9 @@ pub fn require_apart(swarm: &Swarm, formation: &Formation) -> Result<(), SceneEr
 }
 
 /// A length of which the digits of rounding errors are left out \[m\]: micrometres are kept.
-fn rounded(length: f64) -> f64 {
-    (length * 1e6).round() / 1e6
+fn rounded(length: f64) -> String {
+    let micrometres = (length * 1e6).round();
+    number(if micrometres.is_finite() { micrometres / 1e6 } else { length })
 }
 
 /// Refuses places where no pose would be believed.

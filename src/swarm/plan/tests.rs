@@ -81,7 +81,7 @@ fn what_a_network_that_changes_and_commands_do_is_warned_of() {
     };
     let two = "flight.faults=[{ robot = \"robot_1\", at = 2.0, until = 9.0, what = { kind = \"stuck\" } }, \
                { robot = \"robot_1\", at = 5.0, what = { kind = \"dead\" } }]";
-    let cases: [(&[&str], &str); 10] = [
+    let cases: [(&[&str], &str); 11] = [
         (
             &["flight.delay=5"],
             "behind poses 0.250 s old robots at their places have little room, and none behind poses of 0.269 s",
@@ -109,6 +109,13 @@ fn what_a_network_that_changes_and_commands_do_is_warned_of() {
                 "manoeuvres=[{ name = \"turn\", legs = [{ seconds = 30.0, translate = [20.0, 0.0] }] }]",
             ],
             "programs end with these robots' places in an obstacle, before which they will stop: `robot_25`",
+        ),
+        (
+            &[
+                "poses.range=100.0",
+                "manoeuvres=[{ name = \"turn\", legs = [{ seconds = 500.0, translate = [120.0, 0.0] }] }]",
+            ],
+            "farther than poses.range = 100 m from the formation's middle, where no pose is believed: `robot_1`, ",
         ),
     ];
     for (set, words) in cases {

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::{Convergence, DelayMargin, Exactness, ManoeuvreError, ManoeuvreSpeed, SpeedMargin, SwarmPlan};
-use crate::scene::text::counted;
+use crate::scene::text::{counted, decimals};
 
 /// Smaller values read as zero to three places.
 const NOTHING: f64 = 0.001;
@@ -29,9 +29,11 @@ impl fmt::Display for SwarmPlan {
                 self.flight_s
             ),
         )?;
-        let free =
-            self.free_space.map_or(String::new(), |free| format!(", {free:.4} m between the nearest rims"));
-        let apart = spacing.map_or(String::new(), |spacing| format!("places {spacing:.4} m apart{free}, "));
+        let free = self
+            .free_space
+            .map_or(String::new(), |free| format!(", {} m between the nearest rims", decimals(free, 4)));
+        let apart = spacing
+            .map_or(String::new(), |spacing| format!("places {} m apart{free}, ", decimals(spacing, 4)));
         line("formation", format!("{apart}{:.2} neighbours", self.neighbours))?;
         line(
             "loop",
@@ -100,7 +102,7 @@ impl fmt::Display for SwarmPlan {
             (None, _) => {}
         }
         for ManoeuvreSpeed { name, needed } in manoeuvres {
-            line("manoeuvre", format!("`{name}` moves a place at up to {needed:.3} m/s"))?;
+            line("manoeuvre", format!("`{name}` moves a place at up to {} m/s", decimals(*needed, 3)))?;
         }
         for words in self.exactness.iter().flat_map(Exactness::in_words) {
             line("exact", words)?;
@@ -119,7 +121,8 @@ impl Exactness {
         let of_one = |ManoeuvreError { name, largest }: &ManoeuvreError| match largest {
             0.0 => format!("manoeuvre `{name}`: every follower in its place"),
             _ => format!(
-                "manoeuvre `{name}`: followers up to {largest:.3} m from their places, however slow it is"
+                "manoeuvre `{name}`: followers up to {} m from their places, however slow it is",
+                decimals(*largest, 3)
             ),
         };
         std::iter::once(exact).chain(self.manoeuvres.iter().map(of_one)).collect()

@@ -203,6 +203,9 @@ export class Body {
     if (this.gradients) return this.gradients;
     const { bonds, oneWay, X, Y, dx, dy, count } = this;
     const sums = new Float64Array(7 * count);
+    // Products of four distances stay in range in a unit of a bond's size: a power of two, which keeps the digits.
+    const one = oneWay.length ? Math.hypot(X[bonds[1]] - X[bonds[0]], Y[bonds[1]] - Y[bonds[0]]) : 1;
+    const unit = one > 0 ? 2 ** -Math.floor(Math.log2(one)) : 1;
     const add = (i, x, y, u, v) => {
       const at = 7 * i;
       sums[at] += x * x;
@@ -215,7 +218,8 @@ export class Body {
     };
     for (let n = this.brokenBonds(); n < oneWay.length; n++) {
       const [a, b] = [bonds[2 * n], bonds[2 * n + 1]];
-      const [x, y, u, v] = [X[b] - X[a], Y[b] - Y[a], dx[b] - dx[a], dy[b] - dy[a]];
+      const [x, y] = [unit * (X[b] - X[a]), unit * (Y[b] - Y[a])];
+      const [u, v] = [unit * (dx[b] - dx[a]), unit * (dy[b] - dy[a])];
       add(a, x, y, u, v);
       if (!oneWay[n]) add(b, x, y, u, v);
     }

@@ -9,6 +9,7 @@ use crate::flock::motion::{Keyframe, Motion};
 use crate::flock::vectors::distance;
 use crate::scene::swarm::raw::{RawCommandKind, RawSwarm};
 use crate::scene::swarm::{Program, Swarm};
+use crate::scene::text::{decimals, number};
 use crate::swarm::flight::Flight;
 use crate::swarm::formation::Formation;
 pub use network::late_without_speed;
@@ -34,6 +35,7 @@ pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
             .flatten(),
         near_at_the_start(flight, raw),
         led_outside(flight),
+        led_out_of_range(flight, raw),
         in_solids(flight),
         led_into_solids(flight),
     ];
@@ -121,15 +123,35 @@ fn led_outside(flight: &Flight) -> Option<String> {
     let (filter, formation) = (flight.control().filter(), flight.control().formation());
     let end = Some(formation.programs_end()).filter(|end| end.is_finite())?;
     let leaves = |m: usize| {
-        let led = |k: usize| formation.led_to(m, end * k as f64 / (4 * PARTS) as f64);
         let is_in = |place| filter.is_fenced_in(place, formation.radii[m] - ROUNDING);
-        (0..=4 * PARTS).filter_map(led).any(|place| !is_in(place))
+        !along(formation, m, end).all(is_in)
     };
     let names = formation.named(leaves)?;
     Some(format!(
         "programs lead these robots out of limits.geofence: {names}; they will stop at the fence: widen it, or change their \
          programs"
     ))
+}
+
+/// Leaders whose programs go to where no pose is believed.
+fn led_out_of_range(flight: &Flight, raw: &RawSwarm) -> Option<String> {
+    let (control, formation) = (flight.control(), flight.control().formation());
+    let programs_end = formation.programs_end();
+    let is_endless = programs_end.is_infinite();
+    let end = if is_endless { flight.periods() as f64 * control.period() } else { programs_end };
+    let is_lost = |m: usize| !along(formation, m, end).all(|place| control.is_believed(place));
+    let names = formation.named(is_lost)?;
+    Some(format!(
+        "programs lead these robots farther than poses.range = {} m from the formation's middle, where no pose is \
+         believed: {names}; raise it, or change their programs",
+        number(raw.poses.range)
+    ))
+}
+
+/// Places to which a leader's program sends it until `end` \[s\]; none of a follower.
+fn along(formation: &Formation, member: usize, end: f64) -> impl Iterator<Item = [f64; 2]> + '_ {
+    let at = move |k: usize| formation.led_to(member, end * k as f64 / (4 * PARTS) as f64);
+    (0..=4 * PARTS).filter_map(at)
 }
 
 /// Robots whose places in the formation are taken by an obstacle, wherever they start.
@@ -175,8 +197,9 @@ fn fast_manoeuvres(raw: &RawSwarm, formation: &Formation) -> impl Iterator<Item 
     let fast = all.filter(move |one| one.needed > limit);
     fast.map(|ManoeuvreSpeed { name, needed }| {
         format!(
-            "manoeuvre `{name}` moves a robot's place at up to {needed:.3} m/s, above limits.speed: robots will fall \
-             behind; give its legs more seconds"
+            "manoeuvre `{name}` moves a robot's place at up to {} m/s, above limits.speed: robots will fall \
+             behind; give its legs more seconds",
+            decimals(needed, 3)
         )
     })
 }
@@ -191,8 +214,9 @@ fn fast_paths(swarm: &Swarm) -> impl Iterator<Item = String> {
         };
         (fastest > limit * (1.0 + ROUNDING)).then(|| {
             format!(
-                "the program of leaders[{k}] moves a robot at up to {fastest:.3} m/s, above limits.speed: it will fall \
-                 behind; give its points more time"
+                "the program of leaders[{k}] moves a robot at up to {} m/s, above limits.speed: it will fall \
+                 behind; give its points more time",
+                decimals(fastest, 3)
             )
         })
     })
@@ -221,9 +245,10 @@ fn narrow(raw: &RawSwarm, formation: &Formation) -> impl Iterator<Item = String>
         (free < clearance? - ROUNDING).then(|| {
             let [first, second] = [i, j].map(|m| &formation.names[m]);
             format!(
-                "manoeuvre `{}` leaves {free:.3} m between `{first}` and `{second}` at their places, less than \
+                "manoeuvre `{}` leaves {} m between `{first}` and `{second}` at their places, less than \
                  limits.clearance: robots will be held off them; stretch or shear it less",
-                one.name
+                one.name,
+                decimals(free, 3)
             )
         })
     })

@@ -4,6 +4,7 @@ use super::super::{DEVIATIONS_KEPT, largest_noise, room_between, room_for_delay}
 use super::narrowest;
 use crate::flock::vectors::distance;
 use crate::scene::swarm::raw::{RawCommandKind, RawFaultKind, RawManoeuvre, RawSwarm};
+use crate::scene::text::decimals;
 use crate::swarm::flight::Flight;
 use crate::swarm::formation::Formation;
 use crate::swarm::safety::Limits;
@@ -119,9 +120,10 @@ impl Network {
         let off = DEVIATIONS_KEPT * (ranges.noise.powi(2) + 2.0 * self.noise.powi(2)).sqrt();
         (off > ranges.tolerance).then(|| {
             format!(
-                "ranges.noise and {}.noise together, at three deviations {off:.3} m, are above ranges.tolerance: honest \
+                "ranges.noise and {}.noise together, at three deviations {} m, are above ranges.tolerance: honest \
                  robots will be taken for liars; lower them, or raise the tolerance",
-                self.key
+                self.key,
+                decimals(off, 3)
             )
         })
     }
