@@ -16,11 +16,14 @@ use flockform::scene::Scene;
 
 use super::interrupt;
 
+/// The interval when none is asked for.
+const EVERY_MINUTE: &str = "60s";
+
 #[derive(Debug, Args)]
 pub struct CheckpointArguments {
     /// Interval between checkpoints, from which a killed run can be resumed: 60s, 10min, 2h, 5000steps or
     /// never; may be given twice
-    #[arg(long, value_name = "INTERVAL", default_value = "60s")]
+    #[arg(long, value_name = "INTERVAL", default_value = EVERY_MINUTE)]
     checkpoint_every: Vec<Interval>,
     /// Resume the killed or interrupted run with this --out; results are the same to the bit
     #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "force", "record"])]
@@ -66,6 +69,17 @@ impl FromStr for Interval {
 }
 
 impl CheckpointArguments {
+    /// A warning where checkpoints are asked for and there will be none.
+    pub fn caution(&self, scene: &Scene) -> Option<&'static str> {
+        let is_asked = self
+            .checkpoint_every
+            .iter()
+            .any(|&one| one != Interval::Never && Ok(one) != EVERY_MINUTE.parse());
+        (is_asked && scene.equilibrium.is_some()).then_some(
+            "--checkpoint-every is without effect: this scene is solved for its rest, which is done again from the start",
+        )
+    }
+
     /// The run to go on with, if that is asked for.
     pub fn left(&self) -> Result<Option<ResumedRun>, CheckpointError> {
         self.resume.as_deref().map(ResumedRun::find).transpose()

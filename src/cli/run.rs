@@ -199,6 +199,9 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     tracing::info!("planned {own} of {total} particles of `{}` in {setup:.1?}", scene.name);
     tracing::info!("{}", flockform::sweep::chosen_here());
 
+    if let Some(caution) = arguments.checkpoints.caution(&scene).filter(|_| folder.is_some()) {
+        note!("caution: {caution}");
+    }
     let undrawn = left.as_ref().map_or_else(Vec::new, |left| left.undrawn(&scene));
     if arguments.outputs().draws() && !undrawn.is_empty() && !arguments.output.quiet {
         note!(

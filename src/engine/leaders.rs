@@ -104,12 +104,9 @@ impl Engine {
 
     /// The rule keeps held components where their rest offsets say.
     pub(super) fn move_components(&mut self) {
-        let Some(rest) = &mut self.flock.rest else { return };
         for (led, axis) in &self.led_components {
             if let Some(place) = led.place(&self.changes, self.step) {
-                let mut offset = rest.get(led.particle);
-                offset[*axis] = place[*axis];
-                rest.set(led.particle, offset);
+                self.flock.hold_at(led.particle, *axis, place[*axis]);
             }
         }
     }

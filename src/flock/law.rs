@@ -129,6 +129,13 @@ impl MatrixWeights {
         [0, 1].map(|axis| compliance[axis][axis] == 0.0)
     }
 
+    /// How far the free component of a particle is moved back for each unit by which the held one, `axis`, is moved \[1\].
+    fn coupling(&self, particle: usize, axis: usize) -> f64 {
+        let free = 1 - axis;
+        let row = self.stiffness_of(particle).iter().fold(0.0, |sum, block| sum + block[free][axis]);
+        self.compliance(particle)[free][free] * row
+    }
+
     /// How far a force moves the particle while its neighbours stay, `D^-1` \[length / force\].
     pub fn compliance(&self, particle: usize) -> Block {
         self.compliance[self.class[particle] as usize]
@@ -312,6 +319,20 @@ impl Flock {
         };
         let (reference, now) = (from(&self.reference), from(present));
         Corner { reference, displacement: [now[0] - reference[0], now[1] - reference[1]] }
+    }
+
+    /// Holds one component of a particle at a place \[length\], if there are rest offsets; where the rule's rows are the same
+    /// however the body turns, the free one is in balance with that.
+    pub(crate) fn hold_at(&mut self, particle: usize, axis: usize, place: f64) {
+        let Some(mut offset) = self.rest.as_ref().map(|rest| rest.get(particle)) else { return };
+        offset[axis] = place;
+        if let (SMALL, Weights::Matrix(weights)) = (self.rule.mean, &self.weights) {
+            let reference = self.reference.get(particle);
+            let unmoved = self.rule.rest_offset(reference, self.seen(particle, &self.reference));
+            offset[1 - axis] =
+                unmoved[1 - axis] - weights.coupling(particle, axis) * (place - reference[axis]);
+        }
+        self.rest.iter_mut().for_each(|rest| rest.set(particle, offset));
     }
 
     /// Computes and keeps the rest offsets of the reference configuration; none are kept where all

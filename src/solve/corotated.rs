@@ -127,7 +127,7 @@ impl<'a> Way<'a> {
         Self { held, start: None, end: 1.0 }
     }
 
-    /// VectorsMut of the whole way after a part of this one.
+    /// The part of the whole way that belongs to a part of this one.
     fn part(&self, of_this: f64) -> f64 {
         let start = self.start.map_or(0.0, |(_, part)| part);
         if of_this == 1.0 { self.end } else { start + of_this * (self.end - start) }
@@ -328,10 +328,17 @@ impl Corotated<'_> {
         f64::EPSILON * self.norm(&locals.iter().enumerate().map(of_particle).collect())
     }
 
-    /// The force at the start, all followers at zero and all cells in the axes of the reference.
+    /// The force that moves the body: the largest on the way, since leaders that come back leave none at its end.
     fn size(&self) -> f64 {
+        let parts = [1.0, self.way.end, self.way.part(0.5), self.way.part(0.0)];
+        parts.map(|part| self.size_at(part)).into_iter().fold(0.0, f64::max)
+    }
+
+    /// The force with leaders as they are after a part of the whole way, all followers at zero and all cells in the axes of the
+    /// reference.
+    fn size_at(&self, part: f64) -> f64 {
         let mut u = Vectors::zeros(self.follows.len());
-        self.hold(&mut u, &(self.way.held)(1.0));
+        self.hold(&mut u, &(self.way.held)(part));
         let owned = self.body.owned();
         let force = |i: usize| {
             if !(self.follows[i] && owned.contains(&i)) {

@@ -293,3 +293,19 @@ fn nothing_to_resume_is_said_and_what_a_checkpoint_says_is_not_said_again() {
     refused(&["run", "tension", "--checkpoint-every", "often"], "min, h or steps");
     assert_eq!(std::fs::read_dir(folder.path()).expect("readable").count(), 0);
 }
+
+#[test]
+fn checkpoints_that_there_will_be_none_of_are_cautioned_against() {
+    let folder = temporary();
+    let said = |every: &[&str]| {
+        let run = ["run", "beam-loaded", "--force", "--out", "o", "--figures", "none", "--no-report"];
+        let output = flockform(&[&run[..], every].concat(), folder.path());
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        text(&output.stderr)
+    };
+    let caution = "caution: --checkpoint-every is without effect";
+    assert!(said(&["--checkpoint-every", "2steps"]).contains(caution));
+    for quiet in [&[][..], &["--checkpoint-every", "never"]] {
+        assert!(!said(quiet).contains(caution), "{quiet:?}");
+    }
+}

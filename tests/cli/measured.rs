@@ -289,6 +289,59 @@ force = [0.0, -25e3]
     }
 }
 
+/// Each entry that holds a single component is looked at, and one that comes to nothing is no silent one.
+#[test]
+fn components_that_would_be_held_later_or_not_at_all_are_refused_by_name() {
+    let role = |side: &str, role: &str, rest: &str| {
+        format!("[[roles]]\nregion = {{ kind = \"edge\", side = \"{side}\" }}\nrole = \"{role}\"\n{rest}\n")
+    };
+    let (bar, _) = BAR.split_once("[[roles]]").expect("has a clamp");
+    let left = role("left", "clamped", "axis = \"x\"");
+    let cases = [
+        ([left.clone(), role("right", "clamped", "axis = \"y\"\nfrom = 100")], "roles[1].axis"),
+        ([left.clone(), role("right", "follower", "axis = \"y\"")], "roles[1].axis"),
+        ([role("left", "clamped", ""), left.clone()], "roles[1].axis = \"x\": is without effect: roles[0]"),
+    ];
+    for (roles, words) in cases {
+        let (folder, said) = run(&[bar, &roles.concat(), PULL], &["--figures", "none"], 2);
+        assert!(said.contains(words), "no `{words}` in\n{said}");
+        assert!(!folder.path().join("o").exists(), "{words}");
+    }
+}
+
+/// Nothing is moved at the end of a way that leads back, and what is left there is no measure of what is left on the way.
+#[test]
+fn leaders_that_come_back_are_followed_there_and_back_however_the_body_turns() {
+    let body = "title = \"back\"\n[lattice]\nkind = \"square\"\nspacing = 0.5\n\
+                [body]\nshape = { kind = \"rectangle\", max = [4.0, 1.0] }\n\
+                [material]\nkind = \"isotropic\"\nyoung = 100.0\npoisson = 0.3\n\
+                [rule]\nmean = { kind = \"material\", rotation = \"corotated\" }\n\
+                [stop]\nsteps = 1000\n[equilibrium]\n[load_steps]\n";
+    let pulled = "increments = 4\n\
+                  [[roles]]\nregion = { kind = \"edge\", side = \"left\" }\nrole = \"clamped\"\naxis = \"x\"\n\
+                  [[roles]]\nregion = { kind = \"edge\", side = \"bottom\" }\nrole = \"clamped\"\naxis = \"y\"\n\
+                  [[roles]]\nregion = { kind = \"edge\", side = \"right\" }\nrole = \"leader\"\naxis = \"x\"\n\
+                  motion = { kind = \"keyframes\", frames = [{ step = 500, displacement = [0.08, 0.0] }, \
+                  { step = 1000, displacement = [0.0, 0.0] }] }\n";
+    let (folder, _) = run(&[body, pulled], &["--figures", "none"], 0);
+    let rows = table(folder.path().join("o/load.csv"));
+    // 100 times 1 % on a side of 1 at first, along 4.
+    for (name, wanted) in
+        [("roles[2].fx", [0.0, 1.0, 2.0, 1.0, 0.0]), ("strain_energy", [0.0, 0.02, 0.08, 0.02, 0.0])]
+    {
+        let found = &rows[name];
+        assert!(
+            found.iter().zip(wanted).all(|(&found, wanted)| near(found, wanted, 1.0)),
+            "{name}: {found:?}"
+        );
+    }
+    let turned = "increments = 8\n[[roles]]\nregion = { kind = \"boundary\" }\nrole = \"leader\"\n\
+                  motion = { kind = \"affine\", rotate = 360.0, about = [1.0, 1.0], steps = 1000 }\n";
+    let (folder, _) = run(&[body, turned], &["--figures", "none"], 0);
+    let rows = table(folder.path().join("o/load.csv"));
+    assert!(rows["von_mises"].iter().all(|&stress| near(stress, 0.0, 1.0)), "{:?}", rows["von_mises"]);
+}
+
 #[test]
 fn increments_of_a_linear_body_lie_on_a_line_and_a_schedule_comes_back() {
     let (folder, said) = bundled("beam-loaded", &["load_steps={increments=4}"]);

@@ -1,8 +1,10 @@
 //! Single components that are held in a body that turns: rollers and planes of symmetry under `corotated`.
 
+use std::ops::ControlFlow;
+
 use flockform::continuum::mechanics::Mechanics;
 use flockform::continuum::plan::Plan;
-use flockform::continuum::run::Outcome;
+use flockform::continuum::run::{Outcome, run};
 use flockform::flock::vectors::distance;
 use flockform::scene::Scene;
 
@@ -45,6 +47,36 @@ fn a_ring_on_rollers_that_hardly_turns_is_that_of_small_rotations() {
                 assert!(off < 1e-8 * 4e-4, "{kind}: {found:?}, off by {off:e}");
             }
         }
+    }
+}
+
+/// Uniform stress behind a plane of symmetry that is moved: corners, and cells that the outline cuts, are pushed aside by it.
+#[test]
+fn a_roller_that_is_led_step_by_step_moves_the_body_as_one_that_is_solved_for() {
+    for kind in KINDS {
+        let roller = |side: &str, axis: &str, rest: &str| {
+            format!("{{ region = {{ kind = \"edge\", side = \"{side}\" }}, axis = \"{axis}\", {rest} }}")
+        };
+        let up = "role = \"leader\", motion = { kind = \"keyframes\", frames = [{ step = 7, displacement = [0.0, 0.02] }] }";
+        let roles =
+            [("left", "x", "role = \"clamped\""), ("bottom", "y", "role = \"clamped\""), ("top", "y", up)];
+        let roles = roles.map(|(side, axis, rest)| roller(side, axis, rest)).join(", ");
+        let text = format!(
+            "title = \"led\"\nstop = {{ steps = 20000 }}\nrule = {{ mean = {{ kind = \"material\" }} }}\n{}\n\
+             body = {{ shape = {{ kind = \"rectangle\", max = [3.0, 2.0] }} }}\n\
+             material = {{ kind = \"isotropic\", young = 1000.0, poisson = 0.3 }}\nroles = [{roles}]\n",
+            lattice(kind, 0.5, 17.0)
+        );
+        let scene =
+            Scene::parse("led", "led.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+        let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
+        let outcome = run(plan, &mut |_, _| ControlFlow::Continue(()));
+        let mechanics = measured(&outcome);
+        // 1 % of 1000 on 3 by 1.
+        let force = mechanics.reactions[2].force[1];
+        assert!((force - 30.0).abs() < 1e-6 * 30.0, "{kind}: {force}");
+        let [x, _] = mechanics.reactions[0].force;
+        assert!(x.abs() < 1e-6 * 30.0, "{kind}: {x}");
     }
 }
 

@@ -32,7 +32,12 @@ impl Layout {
             let RoleEntry { role, axis, from, when, .. } = *entry;
             Ok(RoleChange { particles, role, axis, from, when, motion })
         };
-        scene.roles.iter().enumerate().map(change).collect()
+        let changes = scene.roles.iter().enumerate().map(change).collect::<Result<Vec<_>, SceneError>>()?;
+        // A part of a body may have just the corner that two regions share.
+        if self.body.part.is_none() {
+            require_free_components(scene, &changes, self.body.count())?;
+        }
+        Ok(changes)
     }
 
     fn motion(
@@ -63,6 +68,26 @@ impl Layout {
         };
         Ok(Some(Motion::Table { displacements, steps: steps as f64 }))
     }
+}
+
+/// Refuses single components of particles all of which an entry above holds altogether: nothing would be left of them.
+fn require_free_components(scene: &Scene, changes: &[RoleChange], count: usize) -> Result<(), SceneError> {
+    let mut holder = vec![None; count];
+    for (k, change) in changes.iter().enumerate().filter(|(_, change)| change.is_at_once()) {
+        if change.axis.is_none() {
+            let holds = change.role != Role::Follower;
+            change.particles.iter().for_each(|&i| holder[i] = holds.then_some(k));
+            continue;
+        }
+        let held = change.particles.iter().map(|&i| holder[i]).collect::<Option<Vec<usize>>>();
+        if let Some(first) = held.and_then(|by| by.first().copied()) {
+            let message =
+                format!("is without effect: roles[{first}] and others above hold these particles altogether");
+            let help = "leave it out, or take its particles out of the other region";
+            return Err(scene.refuse(&format!("roles[{k}].axis"), message, help));
+        }
+    }
+    Ok(())
 }
 
 /// Displacement \[length\] of each particle that does not follow, at `step`; `None` for followers and for leaders

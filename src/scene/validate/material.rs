@@ -246,19 +246,19 @@ pub fn is_fitted(raw: &RawScene, refuse: Refuse<'_>) -> Result<bool, SceneError>
 
 /// Single components are held in a material alone: other rules have no force to leave free.
 pub fn check_axes(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
-    let Some(k) = raw.roles.iter().position(|entry| entry.axis.is_some()) else { return Ok(()) };
-    let key = format!("roles[{k}].axis");
-    if !is_material(raw) {
-        let message = "one component can be held in a material only".into();
-        return Err(refuse(&key, message, "use rule.mean = { kind = \"material\" }, or leave axis out"));
-    }
-    let entry = &raw.roles[k];
-    if !matches!(entry.role, RawRole::Clamped | RawRole::Leader) {
-        return Err(refuse(&key, "only clamped and led particles have an axis".into(), "leave axis out"));
-    }
-    if entry.from > 1 || entry.when.is_some() {
-        let message = "a component is held from the start and for good".into();
-        return Err(refuse(&key, message, "leave `from` and `when` out, or axis"));
+    for (k, entry) in raw.roles.iter().enumerate().filter(|(_, entry)| entry.axis.is_some()) {
+        let key = format!("roles[{k}].axis");
+        if !is_material(raw) {
+            let message = "one component can be held in a material only".into();
+            return Err(refuse(&key, message, "use rule.mean = { kind = \"material\" }, or leave axis out"));
+        }
+        if !matches!(entry.role, RawRole::Clamped | RawRole::Leader) {
+            return Err(refuse(&key, "only clamped and led particles have an axis".into(), "leave axis out"));
+        }
+        if entry.from > 1 || entry.when.is_some() {
+            let message = "a component is held from the start and for good".into();
+            return Err(refuse(&key, message, "leave `from` and `when` out, or axis"));
+        }
     }
     Ok(())
 }
