@@ -7,14 +7,14 @@
 
 use std::collections::{HashMap, HashSet};
 
-use nalgebra::{Matrix2, SymmetricEigen};
 use rayon::prelude::*;
 
 use crate::engine::Engine;
 use crate::flock::body::Body;
 use crate::flock::rules::Rotation;
 use crate::flock::vectors::{Vectors, distance};
-use crate::geometry::point::area;
+use crate::geometry::point::{area, dot, minus};
+use crate::geometry::shape::is_in_polygon;
 use crate::material::cells::{Cells, Incidence};
 use crate::material::elastic::Elastic;
 use crate::material::free_edge::Edge;
@@ -24,9 +24,15 @@ use crate::material::stress::{self, StressState};
 /// Steps of a line of sight \[spacings\].
 const SIGHT: f64 = 0.25;
 
-/// Spread of the middles of cells around their mean, in the direction in which it is least, below which they lie in one
-/// row \[spacings\]: two rows have a half, one row of triangles has a seventh.
-const ONE_ROW: f64 = 0.2;
+/// Thickness across an edge up to which bending does not show \[spacings\]: that of two cells, and a bit.
+const THIN: f64 = 2.6;
+
+/// Cosine of the angle between the outward normals of two sides of a thin body: at least 135 degrees, as at no corner but an
+/// acute one.
+const OPPOSITE: f64 = -0.7;
+
+/// Radius of a hollow from which on the fields follow its stress \[spacings\], and a bit less.
+const HOLLOW: f64 = 7.5;
 
 /// Cells and sides of one material around a particle.
 struct Patch {
@@ -34,7 +40,6 @@ struct Patch {
     cells: Vec<u32>,
     /// Numbers of known tractions.
     tractions: Vec<u32>,
-    is_one_row: bool,
 }
 
 /// Why a particle's stress is the mean of its cells.
@@ -110,14 +115,20 @@ impl<'a> Patches<'a> {
             .collect();
         let of_region = |cell: u32| self.cells.region_of(cell as usize) == region;
         let is_mixed = !all.iter().all(|&cell| of_region(cell));
+        let reached = self.reached(particle, &all);
         let is_seen = |cell: u32| !is_mixed || (of_region(cell) && self.sees(point, cell, &all));
-        let cells: Vec<u32> = all.iter().copied().filter(|&cell| is_seen(cell)).collect();
+        let is_apart = reached.len() < all.len();
+        let cells: Vec<u32> = all
+            .iter()
+            .copied()
+            .filter(|cell| is_seen(*cell) && (!is_apart || reached.contains(cell)))
+            .collect();
         if cells.len() < FEWEST_CELLS {
             return Err(LeftOut::Few);
         }
         let acts_here = |&n: &u32| {
             let (known, cell) = (&self.edge.tractions[n as usize], self.edge.cells[n as usize]);
-            near(known.point) && (!is_mixed || cells.contains(&cell))
+            near(known.point) && (!(is_mixed || is_apart) || cells.contains(&cell))
         };
         let tractions = buckets()
             .filter_map(|b| self.tractions_in.get(&b))
@@ -125,8 +136,62 @@ impl<'a> Patches<'a> {
             .copied()
             .filter(acts_here)
             .collect();
-        let is_one_row = self.least_spread(&cells) < ONE_ROW * self.spacing;
-        Ok(Patch { region, cells, tractions, is_one_row })
+        Ok(Patch { region, cells, tractions })
+    }
+
+    /// Those of the cells that hang together with the particle's own, from corner to corner: stress goes through no slot.
+    fn reached(&self, particle: usize, all: &[u32]) -> Vec<u32> {
+        let own = self.incidence.of(particle);
+        let (mut reached, mut left): (Vec<u32>, Vec<u32>) = all.iter().partition(|cell| own.contains(cell));
+        let mut next = 0;
+        while next < reached.len() && !left.is_empty() {
+            let corners = self.cells.of(reached[next] as usize);
+            let touches = |cell: &u32| self.cells.of(*cell as usize).iter().any(|i| corners.contains(i));
+            reached.extend(left.extract_if(.., |cell| touches(cell)));
+            next += 1;
+        }
+        reached
+    }
+
+    /// Whether the body, or its material, ends again within two cells behind its edge at a particle, and not at a corner.
+    fn is_thin(&self, particle: usize, patch: &Patch) -> bool {
+        let point = self.reference.get(particle);
+        let Some(KnownTraction { normal, .. }) = self.nearest_traction(patch, point) else { return false };
+        let is_within = |at: [f64; 2]| patch.cells.iter().any(|&cell| self.is_in(cell, at));
+        let steps = (THIN / SIGHT).ceil() as usize;
+        let behind = |k: usize| {
+            let far = THIN * self.spacing * k as f64 / steps as f64;
+            [0, 1].map(|axis| point[axis] - far * normal[axis])
+        };
+        // The first steps may pass beside the particle's own cells, where the outline is bent.
+        let Some(end) = (2..=steps).map(behind).find(|&at| !is_within(at)) else { return false };
+        let mut near = around(self.bucket(end)).filter_map(|b| self.cells_in.get(&b)).flatten();
+        let is_in_another = near.any(|&cell| self.is_in(cell, end));
+        let beyond = self.nearest_traction(patch, end).filter(|one| distance(one.point, end) < self.spacing);
+        is_in_another || beyond.is_some_and(|one| dot(one.normal, *normal) < OPPOSITE)
+    }
+
+    fn is_in(&self, cell: u32, at: [f64; 2]) -> bool {
+        let corners = self.cells.of(cell as usize).iter().map(|&i| self.reference.get(i as usize));
+        is_in_polygon(&corners.collect::<Vec<_>>(), at)
+    }
+
+    /// The known traction of a patch that is nearest to a point.
+    fn nearest_traction(&self, patch: &Patch, point: [f64; 2]) -> Option<&KnownTraction> {
+        let known = patch.tractions.iter().map(|&n| &self.edge.tractions[n as usize]);
+        known.min_by(|a, b| distance(a.point, point).total_cmp(&distance(b.point, point)))
+    }
+
+    /// Whether most of the edge around a particle is bent as by a hole of a small radius.
+    fn is_in_hollow(&self, particle: usize, patch: &Patch) -> bool {
+        let Some(here) = self.nearest_traction(patch, self.reference.get(particle)) else { return false };
+        // Outward normals come together over a hollow: those of a circle by the distance over the radius.
+        let bends = |&n: &u32| {
+            let known = &self.edge.tractions[n as usize];
+            let (by, turned) = (minus(known.point, here.point), minus(known.normal, here.normal));
+            -dot(by, turned) * HOLLOW * self.spacing > dot(by, by)
+        };
+        2 * patch.tractions.iter().filter(|n| bends(n)).count() > patch.tractions.len()
     }
 
     /// Whether the line from a point to the middle of a cell stays in the cell's material, by the cell whose middle is
@@ -141,18 +206,6 @@ impl<'a> Patches<'a> {
             let nearest = among.iter().copied().min_by(|&a, &b| apart(a).total_cmp(&apart(b)));
             nearest.is_none_or(|nearest| self.cells.region_of(nearest as usize) == region)
         })
-    }
-
-    /// Standard deviation of the middles of cells in the direction in which it is least \[length\].
-    fn least_spread(&self, cells: &[u32]) -> f64 {
-        let centres: Vectors = cells.iter().map(|cell| self.centroids[cell]).collect();
-        let [x, y] = centres.middle();
-        let mut sum = Matrix2::zeros();
-        for [a, b] in centres.iter().map(|p| [p[0] - x, p[1] - y]) {
-            sum += Matrix2::new(a * a, a * b, a * b, b * b);
-        }
-        let least = SymmetricEigen::new(sum / cells.len() as f64).eigenvalues.min();
-        least.max(0.0).sqrt()
     }
 }
 
@@ -249,11 +302,13 @@ pub(super) fn cautions(
     let patches = Patches::new(edge, body, cells);
     let owned = body.owned();
     let own = edge.particles.par_iter().filter(|i| owned.contains(i));
-    let found: Vec<Result<Patch, LeftOut>> = own.map(|&i| patches.of(i)).collect();
-    let left_out =
-        |why: LeftOut| count(found.iter().filter(|patch| patch.as_ref().is_err_and(|e| *e == why)).count());
-    let one_row = found.iter().filter(|patch| patch.as_ref().is_ok_and(|patch| patch.is_one_row)).count();
-    let one_row = count(one_row);
+    let found: Vec<(usize, Result<Patch, LeftOut>)> = own.map(|&i| (i, patches.of(i))).collect();
+    let left_out = |why: LeftOut| {
+        count(found.iter().filter(|(_, patch)| patch.as_ref().is_err_and(|e| *e == why)).count())
+    };
+    let known = || found.iter().filter_map(|(i, patch)| Some((*i, patch.as_ref().ok()?)));
+    let thin = count(known().filter(|(i, patch)| patches.is_thin(*i, patch)).count());
+    let hollow = count(known().filter(|(i, patch)| patches.is_in_hollow(*i, patch)).count());
     let (interface, few) = (left_out(LeftOut::Interface), left_out(LeftOut::Few));
     let mut cautions = Vec::new();
     if interface > 0 {
@@ -268,10 +323,16 @@ pub(super) fn cautions(
              own material: there it is the mean of a particle's cells, half a cell within the body; use a smaller spacing"
         ));
     }
-    if one_row > 0 {
+    if thin > 0 {
         cautions.push(format!(
-            "the body, or one of its materials, is one cell thick at {one_row} particles of its outline: a cell has one \
+            "the body, or one of its materials, is one or two cells thick at {thin} particles of its outline: a cell has one \
              stress, so that of bending across the thickness does not show; use a smaller spacing (four cells and more)"
+        ));
+    }
+    if hollow > 0 {
+        cautions.push(format!(
+            "stress is too low at {hollow} particles along hollows that are narrow for the spacing, holes above all; use a \
+             spacing of at most an eighth of their radius"
         ));
     }
     cautions

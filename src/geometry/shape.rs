@@ -114,6 +114,11 @@ pub(super) fn polygon_contains(
     if tolerance >= 0.0 { inside || nearest <= tolerance } else { inside && nearest > -tolerance }
 }
 
+/// Whether a point lies in a polygon, by even and odd.
+pub(crate) fn is_in_polygon(vertices: &[[f64; 2]], point: [f64; 2]) -> bool {
+    polygon_contains(vertices, 0..vertices.len(), point, 0.0)
+}
+
 /// As [`polygon_contains`], with arcs as they are.
 pub(super) fn path_contains<'a>(
     pieces: impl Iterator<Item = &'a Piece> + Clone,
