@@ -38,7 +38,7 @@ const SOUND: Series = Series { model: DOUBLE, delay: 0, noise: 0.0, loss: 0.0, f
 /// What stops a robot, or its poses.
 const STOPS: &[&str] = &["silent", "dead", "stuck"];
 
-const SERIES: [Series; 19] = [
+const SERIES: [Series; 18] = [
     SOUND,
     Series { delay: 3, ..SOUND },
     Series { model: SINGLE, ..SOUND },
@@ -52,7 +52,6 @@ const SERIES: [Series; 19] = [
     Series { model: UNICYCLE, noise: 0.02, ..SOUND },
     Series { delay: 3, noise: 0.02, ..SOUND },
     Series { delay: 6, noise: 0.02, loss: 0.5, ..SOUND },
-    Series { model: SINGLE, delay: 3, noise: 0.02, ..SOUND },
     Series { faults: STOPS, ..SOUND },
     Series { faults: STOPS, delay: 6, ..SOUND },
     Series { faults: STOPS, loss: 0.7, ..SOUND },

@@ -200,12 +200,6 @@ impl Filter {
         if !self.limits.arrives || !is_elsewhere || !last.iter().all(|x| x.is_finite()) {
             return target;
         }
-        // One that is to stay is at its last target, not where it was when its pose was taken, give or take the noise.
-        if target == seen.present.get(member)
-            && distance(last, target) <= self.drift(seen, member) + 2.0 * self.limits.margin()
-        {
-            return last;
-        }
         let way = [target[0] - last[0], target[1] - last[1]];
         let step = shortened(way, self.limits.speed * period);
         if step == way { target } else { [last[0] + step[0], last[1] + step[1]] }
