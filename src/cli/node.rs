@@ -149,8 +149,10 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
             let domain = Domain::from_environment()?;
             let mut node =
                 shm::FormationNode::open(&swarm, &domain, name).map_err(|error| refused(&swarm, error))?;
+            // What is said to serve is ended as what serves.
+            let interrupted = interrupt::serves();
             announce(&swarm, node.control());
-            node.run(interrupt::serves())?;
+            node.run(interrupted)?;
         }
     }
     Ok(ExitCode::SUCCESS)
@@ -311,8 +313,9 @@ pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCod
         None if arguments.node_per_robot => return Err(Refusal::NoNodes),
         None => {
             let mut robots = SimulatedRobots::open(&swarm, &Domain::from_environment()?)?;
+            let interrupted = interrupt::serves();
             announce(robots.fleet().robots().len());
-            robots.run(interrupt::serves())?;
+            robots.run(interrupted)?;
         }
     }
     Ok(ExitCode::SUCCESS)

@@ -216,8 +216,11 @@ impl Filter {
         let size = self.radii[member] + self.limits.clearance;
         // Nearer to its goal than its own size, a member waits for the one that stands there; as near as solids let it come
         // to one that they hide, it has arrived.
-        let hidden = self.nearest_to_stand([here[0] + way[0], here[1] + way[1]], member);
-        if distance <= size || distance == 0.0 || hidden > 0.0 && distance <= hidden + ARRIVED * size {
+        let is_hidden = || {
+            let nearest = self.nearest_to_stand([here[0] + way[0], here[1] + way[1]], member);
+            nearest > 0.0 && distance <= nearest + ARRIVED * size
+        };
+        if distance <= size || distance == 0.0 || is_hidden() {
             self.detours[member].reset();
             return direct;
         }

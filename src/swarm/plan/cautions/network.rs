@@ -89,6 +89,11 @@ impl Network {
     fn room(&self, raw: &RawSwarm, flight: &Flight) -> Option<String> {
         /// Part of the room that is left to robots, which are nearer to each other than their places where one lags.
         const LEFT: f64 = 0.75;
+        let late = f64::from(self.delay + self.jitter) * raw.control.period;
+        // All pairs, in all manoeuvres, are compared only where it matters.
+        if late == 0.0 {
+            return None;
+        }
         let (formation, limits) = (flight.control().formation(), flight.control().limits());
         let of_manoeuvre = |one: &RawManoeuvre| {
             let (free, i, j) = narrowest(formation, &formation.manoeuvre(&one.name, 0.0)?)?;
@@ -97,7 +102,6 @@ impl Network {
         };
         let room =
             raw.manoeuvres.iter().filter_map(of_manoeuvre).fold(room_for_delay(formation, limits)?, f64::min);
-        let late = f64::from(self.delay + self.jitter) * raw.control.period;
         (late > LEFT * room).then(|| {
             format!(
                 "behind poses {late:.3} s old robots at their places have little room, and none behind poses of {room:.3} s, since \
