@@ -375,6 +375,26 @@ fn the_programs_wait_until_every_leader_has_been_heard() {
 }
 
 #[test]
+fn the_programs_wait_some_seconds_for_a_robot_that_is_not_heard() {
+    let mut control = Control::new(&load_swarm("square", &[])).expect("laid out");
+    let places = control.formation().places.clone();
+    let pose = |m: usize, stamp: f64| Pose { position: places.get(m), yaw: 0.0, stamp, frame_is_right: true };
+    for tick in 1..=110 {
+        let now = 0.05 * f64::from(tick);
+        (0..25)
+            .filter(|&m| m != MIDDLE)
+            .for_each(|m| control.receive(m, pose(m, now), now).expect("believed"));
+        control.tick(now);
+        assert_eq!(
+            control.program_time() > 0.0,
+            now - 0.05 >= 5.0 - 1e-9,
+            "at {now} s: {}",
+            control.program_time()
+        );
+    }
+}
+
+#[test]
 fn an_emergency_stop_latches_and_the_programs_wait() {
     let mut flight = with_fault("{ kind = \"stuck\" }", &["limits={ speed = 1.0, clearance = 0.3 }"]);
     fly(&mut flight, 30);

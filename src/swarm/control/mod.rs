@@ -97,8 +97,10 @@ pub struct Control {
     run_before: f64,
     /// Periods run since the beginning.
     periods: u64,
-    /// Whether every leader that the loop listens to has sent a pose.
+    /// Whether every leader that the loop listens to has sent a pose, and the others have been waited for.
     begun: bool,
+    /// When all leaders had first been heard \[s\].
+    led_since: Option<f64>,
     /// Members whose poses this loop receives.
     listens: Vec<bool>,
     starts: Vec<Start>,
@@ -146,6 +148,7 @@ impl Control {
             run_before: 0.0,
             periods: 0,
             begun: false,
+            led_since: None,
             listens: vec![true; count],
             starts,
             now: 0.0,
@@ -477,8 +480,7 @@ impl Control {
 
     fn follow(&mut self) {
         // A program that ran before its leaders were up would be over before they could follow it.
-        let awaited = |m: usize| self.listens[m] && self.formation.leads(m) && !self.known[m];
-        self.begun |= !(0..self.formation.count()).any(awaited);
+        self.begun |= self.may_begin();
         if !self.begun {
             self.wanted.clone_from(&self.present);
             return;
@@ -507,6 +509,25 @@ impl Control {
             }
             self.wanted.set(member, target.unwrap_or(self.present.get(member)));
         }
+    }
+
+    /// Whether the programs may begin: all leaders are heard and the others too, or not for some seconds. To begin among robots
+    /// that are about to be heard would lead those that are around them.
+    fn may_begin(&mut self) -> bool {
+        /// \[s\]
+        const PATIENCE: f64 = 5.0;
+        let awaited = |m: usize| self.listens[m] && !self.known[m];
+        let mut awaited = (0..self.formation.count()).filter(|&m| awaited(m)).peekable();
+        if awaited.peek().is_none() {
+            return true;
+        }
+        if awaited.any(|m| self.formation.leads(m)) {
+            self.led_since = None;
+            return false;
+        }
+        let since = self.led_since.filter(|&since| since <= self.now).unwrap_or(self.now);
+        self.led_since = Some(since);
+        self.now - since >= PATIENCE
     }
 
     /// The target by those neighbours alone whose displacements do not stray from the member's own, axis by axis,
