@@ -1,7 +1,8 @@
 //! Stress of the particles along a fitted outline, from the cells near them and the tractions that are known there.
 //!
 //! A field of the recovery ([`crate::material::recovery`]) goes on in one material and without body force alone. So each
-//! particle is given the cells of its own material that no other one hides from it, with the tractions on their sides;
+//! particle is given the cells of its own material that hang together with its own, as across no slot, and that no other
+//! material hides from it, with the tractions on their sides;
 //! and of a body force that part of the stress is taken off which balances it, `-b_x (x - x_0)` and `-b_y (y - y_0)`
 //! about the particle: linear, hence compatible in every material, and zero where the result is wanted.
 
@@ -13,7 +14,7 @@ use crate::engine::Engine;
 use crate::flock::body::Body;
 use crate::flock::rules::Rotation;
 use crate::flock::vectors::{Vectors, distance};
-use crate::geometry::point::{area, dot, minus};
+use crate::geometry::point::{area, dot};
 use crate::geometry::shape::is_in_polygon;
 use crate::material::cells::{Cells, Incidence};
 use crate::material::elastic::Elastic;
@@ -27,9 +28,11 @@ const SIGHT: f64 = 0.25;
 /// Thickness across an edge up to which bending does not show \[spacings\]: that of two cells, and a bit.
 const THIN: f64 = 2.6;
 
-/// Cosine of the angle between the outward normals of two sides of a thin body: at least 135 degrees, as at no corner but an
-/// acute one.
+/// Cosine of the angle between the outward normals of two sides of a thin body: at least 135 degrees.
 const OPPOSITE: f64 = -0.7;
+
+/// The same where the sides meet at a corner: a needle of 18 degrees is thin, a corner of 30 has an end at any spacing.
+const NEEDLE: f64 = -0.95;
 
 /// Radius of a hollow from which on the fields follow its stress \[spacings\], and a bit less.
 const HOLLOW: f64 = 7.5;
@@ -156,7 +159,8 @@ impl<'a> Patches<'a> {
     /// Whether the body, or its material, ends again within two cells behind its edge at a particle, and not at a corner.
     fn is_thin(&self, particle: usize, patch: &Patch) -> bool {
         let point = self.reference.get(particle);
-        let Some(KnownTraction { normal, .. }) = self.nearest_traction(patch, point) else { return false };
+        let Some(here) = self.nearest_traction(patch, point) else { return false };
+        let normal = self.edge.tractions[here].normal;
         let is_within = |at: [f64; 2]| patch.cells.iter().any(|&cell| self.is_in(cell, at));
         let steps = (THIN / SIGHT).ceil() as usize;
         let behind = |k: usize| {
@@ -167,8 +171,19 @@ impl<'a> Patches<'a> {
         let Some(end) = (2..=steps).map(behind).find(|&at| !is_within(at)) else { return false };
         let mut near = around(self.bucket(end)).filter_map(|b| self.cells_in.get(&b)).flatten();
         let is_in_another = near.any(|&cell| self.is_in(cell, end));
-        let beyond = self.nearest_traction(patch, end).filter(|one| distance(one.point, end) < self.spacing);
-        is_in_another || beyond.is_some_and(|one| dot(one.normal, *normal) < OPPOSITE)
+        let is_there = |n: &usize| distance(self.edge.tractions[*n].point, end) < self.spacing;
+        let beyond = self.nearest_traction(patch, end).filter(is_there);
+        is_in_another || beyond.is_some_and(|beyond| self.are_opposite(here, beyond))
+    }
+
+    /// Whether the outline at two known tractions has a thin body between, and no mere corner.
+    fn are_opposite(&self, a: usize, b: usize) -> bool {
+        let cosine = dot(self.edge.tractions[a].normal, self.edge.tractions[b].normal);
+        let meet = match [a, b].map(|n| self.edge.straights[n]) {
+            [Some(a), Some(b)] => a[0] == b[1] || a[1] == b[0],
+            _ => false,
+        };
+        cosine < if meet { NEEDLE } else { OPPOSITE }
     }
 
     fn is_in(&self, cell: u32, at: [f64; 2]) -> bool {
@@ -176,22 +191,18 @@ impl<'a> Patches<'a> {
         is_in_polygon(&corners.collect::<Vec<_>>(), at)
     }
 
-    /// The known traction of a patch that is nearest to a point.
-    fn nearest_traction(&self, patch: &Patch, point: [f64; 2]) -> Option<&KnownTraction> {
-        let known = patch.tractions.iter().map(|&n| &self.edge.tractions[n as usize]);
-        known.min_by(|a, b| distance(a.point, point).total_cmp(&distance(b.point, point)))
+    /// Number of the known traction of a patch that is nearest to a point.
+    fn nearest_traction(&self, patch: &Patch, point: [f64; 2]) -> Option<usize> {
+        let apart = |n: usize| distance(self.edge.tractions[n].point, point);
+        let known = patch.tractions.iter().map(|&n| n as usize);
+        known.min_by(|&a, &b| apart(a).total_cmp(&apart(b)))
     }
 
-    /// Whether most of the edge around a particle is bent as by a hole of a small radius.
+    /// Whether the edge at a particle is bent as by a hole of a small radius; a sharp corner, where stress has no largest
+    /// value at any spacing, is none.
     fn is_in_hollow(&self, particle: usize, patch: &Patch) -> bool {
-        let Some(here) = self.nearest_traction(patch, self.reference.get(particle)) else { return false };
-        // Outward normals come together over a hollow: those of a circle by the distance over the radius.
-        let bends = |&n: &u32| {
-            let known = &self.edge.tractions[n as usize];
-            let (by, turned) = (minus(known.point, here.point), minus(known.normal, here.normal));
-            -dot(by, turned) * HOLLOW * self.spacing > dot(by, by)
-        };
-        2 * patch.tractions.iter().filter(|n| bends(n)).count() > patch.tractions.len()
+        let here = self.nearest_traction(patch, self.reference.get(particle));
+        here.is_some_and(|here| self.edge.hollows[here] * HOLLOW * self.spacing > 1.0)
     }
 
     /// Whether the line from a point to the middle of a cell stays in the cell's material, by the cell whose middle is
@@ -332,7 +343,7 @@ pub(super) fn cautions(
     if hollow > 0 {
         cautions.push(format!(
             "stress is too low at {hollow} particles along hollows that are narrow for the spacing, holes above all; use a \
-             spacing of at most an eighth of their radius"
+             spacing of at most an eighth of their radius, on a honeycomb a thirteenth"
         ));
     }
     cautions

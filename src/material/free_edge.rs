@@ -5,6 +5,8 @@ use std::sync::OnceLock;
 use crate::flock::body::Body;
 use crate::geometry::locate::Finder;
 use crate::geometry::outline::{Outline, Place};
+use crate::geometry::piece::Piece;
+use crate::geometry::point::dot;
 use crate::material::cells::Cells;
 use crate::material::outline_loads::{Load, OutlineLoad};
 use crate::material::recovery::KnownTraction;
@@ -14,6 +16,9 @@ const MOST_DISTANCES: usize = 20_000_000;
 
 /// Sine of the turn to the right from which a corner is an inner one, where stress has no largest value.
 const INNER: f64 = -1e-6;
+
+/// Turn at inner corners up to which a polygon stands for a smooth curve: that of eleven corners around a hole \[rad\].
+const CHORDS: f64 = 0.6;
 
 /// The outline of a body and what acts on it. The [`Edge`] is found on first use: tables and pictures of stress need
 /// it, solvers do not.
@@ -37,6 +42,10 @@ pub struct Edge {
     pub tractions: Vec<KnownTraction>,
     /// Which cell each of them acts on.
     pub cells: Vec<u32>,
+    /// Ends of the straight piece of the outline that each is on; of an arc there are none \[length\].
+    pub straights: Vec<Option<[[f64; 2]; 2]>>,
+    /// One over the radius of the hollow that each is in, 0 in none \[1 / length\].
+    pub hollows: Vec<f64>,
     /// Particles on the outline that are at no inner corner and not held altogether.
     pub particles: Vec<usize>,
     /// On all of the body under the whole load \[force / length^3\].
@@ -110,6 +119,8 @@ impl FreeEdge {
                 let direction = if axis == 0 { [1.0, 0.0] } else { [0.0, 1.0] };
                 edge.tractions.push(KnownTraction { point, normal, direction, value: traction[axis] });
                 edge.cells.push(cell);
+                edge.straights.push(piece.arc.is_none().then_some([piece.from, piece.to]));
+                edge.hollows.push(hollow(outline, &place));
             }
         }
         let on_outline = places.iter().enumerate().filter_map(|(i, place)| Some((i, (*place)?)));
@@ -128,6 +139,26 @@ fn acts_at(load: &OutlineLoad, place: &Place) -> bool {
             && (portion.t[0]..=portion.t[1]).contains(&place.t)
     };
     load.portions.iter().any(holds)
+}
+
+/// One over the radius of the outline where it is bent away from the body, and smooth or a polygon in place of a smooth
+/// curve; 0 elsewhere \[1 / length\].
+fn hollow(outline: &Outline, place: &Place) -> f64 {
+    let (ring, number) = (&outline.rings()[place.ring], place.piece);
+    let piece = &ring[number];
+    if let Some(arc) = &piece.arc {
+        return if arc.sweep < 0.0 { 1.0 / arc.radius } else { 0.0 };
+    }
+    let (before, after) = (&ring[(number + ring.len() - 1) % ring.len()], &ring[(number + 1) % ring.len()]);
+    // A chord turns from the one before by its length over the radius.
+    let turns = [turn_to_right(before, piece), turn_to_right(piece, after)];
+    turns.into_iter().filter(|&turn| turn < CHORDS).fold(0.0, f64::max) / piece.length()
+}
+
+/// The angle between the end of a piece and the beginning of the next \[rad\].
+fn turn_to_right(before: &Piece, after: &Piece) -> f64 {
+    let (a, b) = (before.tangent(1.0), after.tangent(0.0));
+    (a[1] * b[0] - a[0] * b[1]).atan2(dot(a, b))
 }
 
 fn is_inner_corner(outline: &Outline, place: &Place) -> bool {

@@ -144,9 +144,11 @@ fn stress_goes_through_no_slot() {
                 loads = [{ kind = \"traction\", region = { kind = \"outline\", pieces = [2] }, traction = [10.0, 0.0] }]\n\
                 equilibrium = {}\nrecord = { places = [[12.0, 3.0], [12.0, 3.6]] }\n";
     for kind in ["square", "hexagonal", "honeycomb"] {
-        let (found, _) = measured(fork, &[&format!("lattice.kind=\"{kind}\"")]);
+        let (found, cautions) = measured(fork, &[&format!("lattice.kind=\"{kind}\"")]);
         let [pulled, free] = [found[0], found[1]];
         assert!((pulled[0] - 10.0).abs() < 0.01 && free[0].abs() < 0.01, "{kind}: {pulled:?} and {free:?}");
+        // No spacing is an eighth of the radius of a sharp corner.
+        assert!(!cautions.iter().any(|one| one.contains("along hollows")), "{kind}: {cautions:?}");
     }
 }
 
@@ -177,6 +179,46 @@ fn ligaments_and_holes_that_are_small_for_the_spacing_are_cautioned_against() {
             wanted,
             "{radius} at {y} by {h}: {cautions:?}"
         );
+    }
+}
+
+/// It is as many cells thick near its tip at any spacing.
+#[test]
+fn the_corner_of_a_triangle_is_no_neck_but_a_needle_is_one() {
+    let triangle = |height: f64| {
+        format!(
+            "body={{ shape = {{ kind = \"polygon\", vertices = [[0.0, 0.0], [40.0, 0.0], [40.0, {height}]] }} }}"
+        )
+    };
+    let pulled = "loads=[{ kind = \"traction\", region = { kind = \"outline\", pieces = [1] }, traction = [1.0, 0.0] }]";
+    let held = "roles=[{ region = { kind = \"outline\", pieces = [2] }, role = \"clamped\" }]";
+    for kind in ["square", "hexagonal", "honeycomb"] {
+        let lattice = format!("lattice={{ kind = \"{kind}\", spacing = 1.0 }}");
+        // Of 27, 35 and 6 degrees.
+        for (height, is_thin) in [(20.0, false), (28.0, false), (4.0, true)] {
+            let cautions = planned(BENT, &[&lattice, &triangle(height), held, pulled, "record={}"]);
+            let found = cautions.iter().any(|one| one.contains("one or two cells thick"));
+            assert_eq!(found, is_thin, "{kind}, {height}: {cautions:?}");
+        }
+    }
+}
+
+#[test]
+fn a_polygon_in_place_of_a_circle_is_a_hollow_and_a_square_is_none() {
+    for (corners, is_hollow) in [(16, true), (4, false)] {
+        let corner = |k: i32| {
+            let angle = f64::from(k) * std::f64::consts::TAU / f64::from(corners);
+            format!("[{:?}, {:?}]", 25.0 + 4.0 * angle.cos(), 25.0 + 4.0 * angle.sin())
+        };
+        let corners = (0..corners).map(corner).collect::<Vec<_>>().join(", ");
+        let plate = format!(
+            "body={{ shape = {{ kind = \"rectangle\", max = [50.0, 50.0] }}, \
+             holes = [{{ kind = \"polygon\", vertices = [{corners}] }}] }}"
+        );
+        let held = "roles=[{ region = { kind = \"edge\", side = \"left\" }, role = \"clamped\" }]";
+        let pulled = "loads=[{ kind = \"traction\", region = { kind = \"edge\", side = \"right\" }, traction = [1.0, 0.0] }]";
+        let cautions = planned(BENT, &["lattice.spacing=1.0", &plate, held, pulled, "record={}"]);
+        assert_eq!(cautions.iter().any(|one| one.contains("along hollows")), is_hollow, "{cautions:?}");
     }
 }
 
