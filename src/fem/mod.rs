@@ -77,7 +77,9 @@ pub use material::{Inclusions, Material, Orthotropic, Plane, Stress};
 pub use mesh::{Mesh, Side};
 pub use outline_mesh::{MeshRequest, OutlineMesh, OutlineSide};
 pub use problem::{Axis, Fixed, PointForce, Problem, Traction};
-pub use shape_problem::{Field, Holding, PlaneRegion, PortionTraction, ShapeProblem, Support, TractionField};
+pub use shape_problem::{
+    Field, Holding, PlaneRegion, PortionTraction, ShapeProblem, Support, TractionField, WayField,
+};
 pub use shape_solve::{Effort, EstimatedError, Level, Reaction, ShapeSolution, solve_shape};
 pub use solution::Solution;
 pub use solve::solve;

@@ -22,14 +22,24 @@ const MOST_TURN: f64 = 1.0;
 /// The shortest part of the way.
 const LEAST_STRIDE: f64 = 1.0 / 1024.0;
 
+/// Parts of a way at which the force that moves the body is looked at: leaders that come back leave none at its end.
+const LOOKS: u32 = 7;
+
+/// What is prescribed after a part of the way, shape [2 * nodes].
+pub(crate) type Held<'a> = dyn Fn(f64) -> Vec<Option<f64>> + 'a;
+
 /// From displacements near the equilibrium \[m\], shape [2 * nodes], or, without one or where that leads nowhere, from the reference.
+/// Supports go the way they are `led`, or straight to where they are prescribed.
 pub(crate) fn solve_turning(
     problem: &Problem,
     prescribed: &[Option<f64>],
     start: Option<Vec<f64>>,
+    led: Option<&Held<'_>>,
 ) -> Result<Solution, FemError> {
-    let system = assemble(problem, prescribed);
-    let way = Way { problem, prescribed, loads: nodal_loads(problem), size: norm(&system.load) };
+    let size_of = |prescribed: &[Option<f64>]| norm(&assemble(problem, prescribed).load);
+    let looks = led.into_iter().flat_map(|led| (1..LOOKS).map(move |k| led(f64::from(k) / f64::from(LOOKS))));
+    let size = looks.map(|held| size_of(&held)).fold(size_of(prescribed), f64::max);
+    let way = Way { problem, prescribed, led, loads: nodal_loads(problem), size };
     let at_rest = way.solution(vec![0.0; prescribed.len()])?;
     if way.size == 0.0 {
         return Ok(at_rest);
@@ -54,9 +64,10 @@ pub(crate) fn solve_turning(
 struct Way<'a> {
     problem: &'a Problem,
     prescribed: &'a [Option<f64>],
+    led: Option<&'a Held<'a>>,
     /// \[N\], shape \[nodes\]
     loads: Vec<[f64; 2]>,
-    /// Of the force that is left on the body before anything of it has moved \[N\].
+    /// Of the force that is left on the body before anything of it has moved, the largest on the way \[N\].
     size: f64,
 }
 
@@ -67,9 +78,18 @@ impl Way<'_> {
         Ok(found?.with_inclusions(self.problem.inclusions.clone()).with_strain(Strain::Stretch))
     }
 
+    /// What is prescribed after a part of the way.
+    fn held(&self, part: f64) -> Vec<Option<f64>> {
+        match self.led {
+            Some(led) if part < 1.0 => led(part),
+            _ => self.prescribed.iter().map(|end| end.map(|end| part * end)).collect(),
+        }
+    }
+
     /// The equilibrium at a part of the way, from a state on it; `None` if Newton's method does not get there.
     fn part(&self, mut at: Solution, part: f64) -> Result<Option<Solution>, FemError> {
         let turned = at.turns();
+        let held = self.held(part);
         let mut last_step = f64::INFINITY;
         for _ in 0..MOST_STEPS {
             let forces = at.nodal_forces();
@@ -77,8 +97,8 @@ impl Way<'_> {
                 .map(|(load, own)| [0, 1].map(|k| part * load[k] - own[k]))
                 .collect();
             let u = |c: usize| [at.ux(), at.uy()][c % 2][c / 2];
-            let step = |c: usize| self.prescribed[c].map(|end| part * end - u(c));
-            let steps: Vec<Option<f64>> = (0..self.prescribed.len()).map(step).collect();
+            let step = |c: usize| held[c].map(|there| there - u(c));
+            let steps: Vec<Option<f64>> = (0..held.len()).map(step).collect();
             let free = (0..steps.len()).filter(|&c| steps[c].is_none()).map(|c| left[c / 2][c % 2]);
             let residual = norm(&free.collect::<Vec<_>>()) / self.size;
             let is_there = steps.iter().flatten().all(|step| *step == 0.0);
@@ -95,10 +115,7 @@ impl Way<'_> {
                 Err(FemError::Singular { .. }) => return Ok(None),
                 moved => moved?,
             };
-            let next = moved.iter().enumerate().map(|(c, by)| match self.prescribed[c] {
-                Some(end) => part * end,
-                None => u(c) + by,
-            });
+            let next = moved.iter().enumerate().map(|(c, by)| held[c].unwrap_or_else(|| u(c) + by));
             let next: Vec<f64> = next.collect();
             last_step = norm(&moved) / norm(&next);
             at = match self.solution(next) {

@@ -24,6 +24,9 @@ const MOST_GRADED: usize = 16;
 /// A displacement \[m\] or a force of the place \[m\].
 pub type Field<'a> = Box<dyn Fn(Point) -> Point + 'a>;
 
+/// A displacement \[m\] after a part of the way \[1\], of the place \[m\].
+pub type WayField<'a> = Box<dyn Fn(f64, Point) -> Point + 'a>;
+
 /// A traction [N/m2] of the place \[m\] and of the outward normal there, which has length 1.
 pub type TractionField<'a> = Box<dyn Fn(Point, Point) -> Point + 'a>;
 
@@ -71,6 +74,8 @@ pub struct Support<'a> {
     pub components: [bool; 2],
     /// Of the place in the undeformed body \[m\].
     pub displacement: Field<'a>,
+    /// How a support of a body that turns far gets there; straight if not given.
+    pub way: Option<WayField<'a>>,
 }
 
 /// A traction on parts of the outline.
@@ -126,7 +131,8 @@ impl<'a> ShapeProblem<'a> {
     /// Holds both components on portions of the outline at a displacement \[m\] of the place.
     pub fn hold(&mut self, on: Vec<Portion>, displacement: impl Fn(Point) -> Point + 'a) {
         let displacement = Box::new(displacement);
-        self.supports.push(Support { on: Holding::Portions(on), components: [true; 2], displacement });
+        let on = Holding::Portions(on);
+        self.supports.push(Support { on, components: [true; 2], displacement, way: None });
     }
 
     /// Pulls portions of the outline by a traction [N/m2] of the place \[m\] and the outward normal.
@@ -260,6 +266,21 @@ impl<'a> ShapeProblem<'a> {
         }
         (problem.body_force, problem.strain) = (self.body_force, self.strain);
         Ok((problem, holder))
+    }
+
+    /// What supports prescribe after a part of the way, shape [2 * nodes].
+    pub(crate) fn held_after(&self, part: f64, mesh: &Mesh, holders: &Holders) -> Vec<Option<f64>> {
+        let of_node = |(node, holders): (usize, &[Option<usize>; 2])| {
+            let at = [mesh.x()[node], mesh.y()[node]];
+            [0, 1].map(|axis| {
+                let support = &self.supports[holders[axis]?];
+                Some(match &support.way {
+                    Some(way) => way(part, at)[axis],
+                    None => part * (support.displacement)(at)[axis],
+                })
+            })
+        };
+        holders.iter().enumerate().flat_map(of_node).collect()
     }
 
     /// Which cells are of other materials, by the middle of each.

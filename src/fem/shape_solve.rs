@@ -11,6 +11,7 @@ use super::error::FemError;
 use super::locate::invert;
 use super::material::Stress;
 use super::mesh::Mesh;
+use super::newton::Held;
 use super::outline_mesh::{MeshRequest, OutlineMesh};
 use super::shape_problem::ShapeProblem;
 use super::solution::Solution;
@@ -111,7 +112,9 @@ fn refine(problem: &ShapeProblem<'_>, effort: &Effort, is_graded: bool) -> Resul
         let (on_mesh, holder) = problem.on_mesh(&mesh)?;
         let turns = problem.strain == Strain::Stretch;
         let start = last.as_ref().filter(|_| turns).map(|(coarse, _)| carried(coarse, &on_mesh.mesh));
-        let solution = match (solve_near(&on_mesh, start), last) {
+        let led = |part: f64| problem.held_after(part, &on_mesh.mesh, &holder);
+        let is_led = problem.supports.iter().any(|support| support.way.is_some());
+        let solution = match (solve_near(&on_mesh, start, is_led.then_some(&led as &Held<'_>)), last) {
             (Err(FemError::Lost { .. }), Some(coarser)) if levels.len() >= 2 => {
                 return Ok(solved(coarser, levels));
             }

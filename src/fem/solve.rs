@@ -13,7 +13,7 @@ use faer::{Conj, MatMut, Par, Side};
 use super::assemble::{System, assemble};
 use super::error::FemError;
 use super::mesh::Mesh;
-use super::newton::solve_turning;
+use super::newton::{Held, solve_turning};
 use super::problem::Problem;
 use super::solution::Solution;
 use super::strain::Strain;
@@ -34,17 +34,21 @@ const SINGULAR: f64 = 1e-14;
 /// parts that hang together by hinges; [`FemError::Lost`] for a body that turns and has no equilibrium under all of its
 /// loads; [`FemError::Factorisation`] if memory does not suffice.
 pub fn solve(problem: &Problem) -> Result<Solution, FemError> {
-    solve_near(problem, None)
+    solve_near(problem, None, None)
 }
 
 /// The same for a body of which displacements near its equilibrium are known \[m\], shape [2 * nodes], which helps where
-/// it turns.
-pub(crate) fn solve_near(problem: &Problem, start: Option<Vec<f64>>) -> Result<Solution, FemError> {
+/// it turns. Its supports are `led` there on a way that need not be straight.
+pub(crate) fn solve_near(
+    problem: &Problem,
+    start: Option<Vec<f64>>,
+    led: Option<&Held<'_>>,
+) -> Result<Solution, FemError> {
     problem.check()?;
     let prescribed = problem.prescribed()?;
     check_rigid_motion(&problem.mesh, &prescribed)?;
     if problem.strain == Strain::Stretch {
-        return solve_turning(problem, &prescribed, start);
+        return solve_turning(problem, &prescribed, start, led);
     }
     let system = assemble(problem, &prescribed);
     let unknowns = if system.load.is_empty() { Vec::new() } else { solve_reduced(&system, &problem.mesh)? };

@@ -34,6 +34,9 @@ use crate::flock::vectors::Vectors;
 use crate::geometry::point::minus;
 use crate::ranks::{Team, added};
 
+/// Parts of a way at whose ends the force that moves the body is looked at: odd, so that leaders that turn there and back, or
+/// round and round, are not met where they began each time.
+const LOOKS: u32 = 7;
 /// Newton steps of one increment.
 const MOST_STEPS: usize = 16;
 /// Steps in a row that do not halve the residual after which rounding is taken to have the last word.
@@ -330,8 +333,8 @@ impl Corotated<'_> {
 
     /// The force that moves the body: the largest on the way, since leaders that come back leave none at its end.
     fn size(&self) -> f64 {
-        let parts = [1.0, self.way.end, self.way.part(0.5), self.way.part(0.0)];
-        parts.map(|part| self.size_at(part)).into_iter().fold(0.0, f64::max)
+        let on_the_way = (0..=LOOKS).map(|k| self.way.part(f64::from(k) / f64::from(LOOKS)));
+        on_the_way.chain([1.0]).map(|part| self.size_at(part)).fold(0.0, f64::max)
     }
 
     /// The force with leaders as they are after a part of the whole way, all followers at zero and all cells in the axes of the

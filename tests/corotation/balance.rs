@@ -43,7 +43,7 @@ fn reactions_carry_the_load_and_its_moment_in_the_deformed_state() {
     }
 }
 
-fn energy(beam: &Beam, at: &Vectors) -> f64 {
+pub fn energy(beam: &Beam, at: &Vectors) -> f64 {
     let Weights::Matrix(weights) = &beam.flock.weights else { panic!("a material") };
     let from = |points: &Vectors, i: usize, j: usize| {
         let (a, b) = (points.get(i), points.get(j));

@@ -1,5 +1,6 @@
 //! The corotated material: elastica, balance of forces and moments, symmetry, energy.
 
+mod back;
 mod balance;
 mod elastica;
 mod support;

@@ -32,7 +32,7 @@ fn hold_at(
     components: [bool; 2],
     displacement: impl Fn(Point) -> Point + 'static,
 ) -> Support<'static> {
-    Support { on: Holding::Point(at), components, displacement: Box::new(displacement) }
+    Support { on: Holding::Point(at), components, displacement: Box::new(displacement), way: None }
 }
 
 /// Relative L2 error against a known displacement.
@@ -268,7 +268,7 @@ fn the_stated_error_holds_for_supports_and_loads_of_all_kinds() {
         holes: vec![Shape::Disc { centre: [8.0, 4.0], radius: 1.5 }],
     });
     let mut problem = ShapeProblem::new(&plate, material);
-    let region = |on, components| Support { on, components, displacement: Box::new(|_| [0.0; 2]) };
+    let region = |on, components| Support { on, components, displacement: Box::new(|_| [0.0; 2]), way: None };
     let corner = PlaneRegion::Box { min: [-1.0, -1.0], max: [2.0, 3.0] };
     problem.supports.push(region(Holding::Region(corner), [true; 2]));
     problem.supports.push(region(
@@ -285,7 +285,12 @@ fn the_stated_error_holds_for_supports_and_loads_of_all_kinds() {
     let held = PlaneRegion::Disc { centre: [-2.0, 0.0], radius: 1.0 };
     problem.supports.push(region(Holding::Region(held), [true; 2]));
     let led = Holding::Segment([[2.0, -1.0], [3.0, 1.0]]);
-    problem.supports.push(Support { on: led, components: [true; 2], displacement: Box::new(|_| [0.5, 0.1]) });
+    problem.supports.push(Support {
+        on: led,
+        components: [true; 2],
+        displacement: Box::new(|_| [0.5, 0.1]),
+        way: None,
+    });
     assert_stated_by_itself("disc", &problem);
 }
 
@@ -345,6 +350,7 @@ fn bodies_that_are_not_held_and_supports_beside_them_are_refused_by_name() {
         on: Holding::Region(far),
         components: [true; 2],
         displacement: Box::new(|_| [0.0; 2]),
+        way: None,
     });
     assert_eq!(solve(&problem), Err(FemError::EmptySupport { index: 1 }));
     problem.supports.truncate(1);
@@ -388,6 +394,32 @@ fn a_strip_that_bends_far_is_the_elastica() {
         assert!(reaction.force[0].abs() < 1e-6 * load && (reaction.force[1] / load + 1.0).abs() < 1e-6);
         assert!((reaction.moment / (load * arm) + 1.0).abs() < 1e-6, "{reaction:?}");
     }
+}
+
+#[test]
+fn a_bar_turned_at_its_ends_along_their_circle_is_turned_without_stress() {
+    let outline = outline(&Shape::Rectangle { min: [-5.0, -0.5], max: [5.0, 0.5] });
+    let turned = |angle: f64, [x, y]: Point| {
+        let (sin, cos) = angle.sin_cos();
+        [cos * x - sin * y - x, sin * x + cos * y - y]
+    };
+    let whole = 120f64.to_radians();
+    let solved = |is_led: bool| {
+        let material = Material::isotropic(1000.0, 0.3, Plane::Stress, 1.0).unwrap();
+        let mut problem = ShapeProblem::new(&outline, material);
+        problem.strain = Strain::Stretch;
+        for side in [1, 3] {
+            problem.hold(pieces(&outline, 0, &[side]), move |p| turned(whole, p));
+        }
+        for support in &mut problem.supports {
+            support.way = is_led.then_some(Box::new(move |part, p| turned(part * whole, p)));
+        }
+        solve_shape(&problem, &Effort { cells: 40, ..Effort::default() })
+    };
+    // In a straight line the ends would come within half of their distance of each other.
+    assert!(matches!(solved(false).err(), Some(FemError::Lost { .. })));
+    let solved = solved(true).unwrap();
+    assert!(error(&solved, |x, y| turned(whole, [x, y])) < 1e-8);
 }
 
 #[test]

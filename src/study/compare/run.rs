@@ -273,6 +273,7 @@ pub(super) fn refused(scene: &Scene, error: &FemError) -> SceneError {
             ("body.shape", "keep corners, holes and supports further apart")
         }
         FemError::EmptySupport { .. } => ("roles", "move the region onto the body"),
+        FemError::Lost { .. } if scene.loads.is_empty() => ("roles", "lead it less far"),
         FemError::Lost { .. } => ("loads", "load it less, or lead it there"),
         _ => ("material", "use constants, lattice and loads less far apart"),
     };

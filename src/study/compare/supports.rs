@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::continuum::layout::Layout;
 use crate::engine::setup::{RoleChange, of_first_roles};
-use crate::fem::{Field, Holding, PlaneRegion, Support};
+use crate::fem::{Field, Holding, PlaneRegion, Support, WayField};
 use crate::flock::motion::Motion;
 use crate::flock::region::Region;
 use crate::flock::role::Role;
@@ -35,6 +35,11 @@ pub fn supports(
     step: f64,
 ) -> Result<Vec<Support<'static>>, SceneError> {
     let mut supports = Vec::new();
+    // As the rule's own equilibrium has it: the way ends where the last leader rests.
+    let motions = changes.iter().filter_map(|change| change.motion.as_ref());
+    let durations =
+        motions.map(|motion| motion.duration().map_or(step, |steps| f64::min(steps as f64, step)));
+    let end = durations.fold(0.0, f64::max);
     let holders = of_first_roles(changes, layout.body.count(), |k, change| holds(change).then_some(k));
     for (k, change) in changes.iter().enumerate().filter(|(_, change)| holds(change)) {
         let axes = change.axis.map_or([0, 1].as_slice(), |axis| &[0, 1][axis as usize..=axis as usize]);
@@ -51,7 +56,8 @@ pub fn supports(
         let mut components = [false; 2];
         axes.iter().for_each(|&axis| components[axis] = true);
         for on in of_region.map_or_else(|| picked.one_by_one(), |on| vec![on]) {
-            supports.push(Support { on, components, displacement: displacement(layout, change, step) });
+            let displacement = displacement(layout, change, step);
+            supports.push(Support { on, components, displacement, way: way(change, end) });
         }
     }
     Ok(supports)
@@ -80,6 +86,14 @@ fn displacement(layout: &Layout, change: &RoleChange, step: f64) -> Field<'stati
             let motion = motion.clone();
             Box::new(move |p| motion.displacement(step, 0, p))
         }
+    }
+}
+
+/// How an entry's particles get there, `end` steps being the whole way; none where that is straight.
+fn way(change: &RoleChange, end: f64) -> Option<WayField<'static>> {
+    match change.motion.clone()? {
+        Motion::Table { .. } | Motion::Velocity { .. } => None,
+        motion => Some(Box::new(move |part, p| motion.displacement(part * end, 0, p))),
     }
 }
 
