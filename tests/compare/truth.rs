@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 
 use flockform::fem::Effort;
+use flockform::flock::vectors::Vectors;
 use flockform::study::compare::measures::Comparison;
 use flockform::study::compare::run::{SceneReference, compare, reference_of};
 use flockform::study::compare::split::ErrorParts;
@@ -53,6 +54,32 @@ fn the_truth_is_the_same_on_every_lattice() {
         assert!(largest_difference(&corner(&found), &first) < 1e-9, "{lattice}");
         assert!(found.solution.error().displacement < 1e-4, "{lattice}: {:?}", found.solution.error());
     }
+}
+
+#[test]
+fn the_truth_of_a_bar_turned_between_two_grips_is_led_around_as_they_are() {
+    let led = "motion = { kind = \"affine\", rotate = 120.0, about = [5.0, 0.5], steps = 100 }";
+    let grips = ["left", "right"].map(|side| {
+        format!("{{ region = {{ kind = \"edge\", side = \"{side}\" }}, role = \"leader\", {led} }}")
+    });
+    let bar = [
+        "body={ shape = { kind = \"rectangle\", max = [10.0, 1.0] } }",
+        "lattice={ kind = \"square\", spacing = 0.5 }",
+        "rule.mean={ kind = \"material\", rotation = \"corotated\" }",
+        &format!("roles=[{}]", grips.join(", ")),
+        "loads=[]",
+        "stop.steps=100",
+    ];
+    let found = truth("beam-loaded", &bar);
+    let places: Vectors = [[0.0, 0.5], [3.0, 0.0], [5.0, 0.5], [8.0, 1.0]].into_iter().collect();
+    let (sin, cos) = 120f64.to_radians().sin_cos();
+    let turned = |[x, y]: [f64; 2]| {
+        let [a, b] = [x - 5.0, y - 0.5];
+        [cos * a - sin * b - a, sin * a + cos * b - b]
+    };
+    let known: Vectors = places.iter().map(turned).collect();
+    let displaced = found.solution.displacements_at(&places).unwrap_or_else(|e| panic!("{e}"));
+    assert!(largest_difference(&displaced, &known) < 1e-7);
 }
 
 const COOK: [&str; 5] = [
