@@ -403,7 +403,7 @@ fn a_bar_turned_at_its_ends_along_their_circle_is_turned_without_stress() {
         let (sin, cos) = angle.sin_cos();
         [cos * x - sin * y - x, sin * x + cos * y - y]
     };
-    let whole = 120f64.to_radians();
+    let whole = 240f64.to_radians();
     let solved = |is_led: bool| {
         let material = Material::isotropic(1000.0, 0.3, Plane::Stress, 1.0).unwrap();
         let mut problem = ShapeProblem::new(&outline, material);
@@ -416,10 +416,10 @@ fn a_bar_turned_at_its_ends_along_their_circle_is_turned_without_stress() {
         }
         solve_shape(&problem, &Effort { cells: 40, ..Effort::default() })
     };
-    // In a straight line the ends would come within half of their distance of each other.
-    assert!(matches!(solved(false).err(), Some(FemError::Lost { .. })));
-    let solved = solved(true).unwrap();
-    assert!(error(&solved, |x, y| turned(whole, [x, y])) < 1e-8);
+    let off = |solved: &ShapeSolution| error(solved, |x, y| turned(whole, [x, y]));
+    // In a straight line the ends would go through each other.
+    assert!(solved(false).map_or(true, |straight| off(&straight) > 0.1));
+    assert!(off(&solved(true).unwrap()) < 1e-8);
 }
 
 #[test]

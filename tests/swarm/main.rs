@@ -9,6 +9,7 @@ mod files;
 mod flights;
 #[path = "../common/folders.rs"]
 mod folders;
+mod late;
 mod ranges;
 #[path = "../common/scenes.rs"]
 mod scenes;

@@ -66,7 +66,7 @@ struct Start {
     age: f64,
 }
 
-/// The filter's input where there are tracks.
+/// The filter's input for members that take time to brake.
 #[derive(Clone)]
 struct Tracked {
     present: Vectors,
@@ -81,8 +81,10 @@ pub struct Control {
     formation: Formation,
     watch: Watch,
     filter: Filter,
-    /// Present states of members that take time to brake; empty for other models.
+    /// Where members are by the targets sent to them.
     tracks: Vec<Track>,
+    /// Whether they take time to brake.
+    brakes: bool,
     /// Members whose targets this loop sends.
     serves: Vec<bool>,
     /// Liars tolerated among a member's neighbours.
@@ -136,7 +138,8 @@ impl Control {
         let starts = formation.starts(swarm)?.iter().map(|place| Start { place, age: 0.0 }).collect();
         Ok(Self {
             watch: Watch::new(count, watch),
-            tracks: vec![Track::default(); if brakes { count } else { 0 }],
+            tracks: vec![Track::default(); count],
+            brakes,
             serves: vec![true; count],
             filter,
             max_faulty,
@@ -242,8 +245,10 @@ impl Control {
             (Err(_), _) => self.rejected[member] = true,
         }
         let (dynamics, deviation) = (self.dynamics(), self.filter.limits().deviation);
-        if let (Ok(()), Some(track)) = (&verdict, self.tracks.get_mut(member)) {
-            track.correct(&pose, &dynamics, self.period, deviation);
+        match (&verdict, &mut self.tracks[member]) {
+            (Ok(()), track) if self.brakes => track.correct(&pose, &dynamics, self.period, deviation),
+            (Ok(()), track) => track.note(&pose),
+            (Err(_), _) => {}
         }
         verdict
     }
@@ -402,16 +407,20 @@ impl Control {
         let active = self.mode != Mode::Inactive;
         self.follow_tracks(now);
         let Self { present, velocity, ages, usable: known, tracked, .. } = self;
-        let seen = if self.tracks.is_empty() {
-            safety::Seen { present, known, ages, velocity: Some(velocity), strays: None }
-        } else {
-            let Tracked { present, velocity, ages, strays } = tracked;
-            safety::Seen { present, known, ages, velocity: Some(velocity), strays: Some(strays) }
+        let (present, velocity, ages) = match self.brakes {
+            true => (&tracked.present, &tracked.velocity, &tracked.ages),
+            false => (&*present, &*velocity, &*ages),
         };
+        let seen =
+            safety::Seen { present, known, ages, velocity: Some(velocity), strays: Some(&tracked.strays) };
         self.filter.apply(&seen, &self.wanted, self.period, &mut self.safe, &mut self.filtered);
         for member in 0..self.tracks.len() {
             let target = self.target(member);
-            self.tracks[member].send(now, target);
+            // Others may move it while the loop sends it nothing.
+            match active || self.brakes {
+                true => self.tracks[member].send(now, target),
+                false => self.tracks[member].forget(),
+            }
         }
         for (member, flags) in self.flags.iter_mut().enumerate() {
             if active && self.usable[member] {
@@ -444,8 +453,8 @@ impl Control {
         }
     }
 
-    /// Estimates the present states of members that take time to brake, and where they may be if they do not follow their
-    /// targets: a lost one is where it was left to itself, one that was never heard nor sent anything is where it starts. The
+    /// Finds where members may be whose poses are late: those that take no time to brake are between the places to which
+    /// they were sent. Of those that do, estimates the present states, and where they may be if they do not follow their targets: a lost one is where it was left to itself, one that was never heard nor sent anything is where it starts. The
     /// targets of a member of another node are not known here, and none were sent to a place that is not of the member's own
     /// poses: there the last place counts, with its age, and velocities that are older still.
     fn follow_tracks(&mut self, now: f64) {
@@ -454,7 +463,15 @@ impl Control {
         let Tracked { present, velocity, ages, strays } = &mut self.tracked;
         for (member, track) in self.tracks.iter().enumerate() {
             let stray = &mut strays[member];
-            if self.serves[member] && track.is_of(self.present.get(member)) {
+            let follows = self.serves[member] && track.is_of(self.present.get(member));
+            if !self.brakes {
+                stray.places.clear();
+                if follows && self.ages[member] > 0.0 {
+                    track.between(&mut stray.places);
+                }
+                continue;
+            }
+            if follows {
                 let robot = track.at(now, &dynamics, self.period, &mut stray.places);
                 present.set(member, robot.position);
                 velocity.set(member, robot.velocity);

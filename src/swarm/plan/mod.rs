@@ -110,8 +110,8 @@ pub struct DelayMargin {
     pub largest_s: f64,
     /// The same in whole periods.
     pub largest_periods: usize,
-    /// Age from which on two robots at their places may be too near for all that poses say, so that they hold each other \[s\];
-    /// absent where robots are not kept apart, or are predicted.
+    /// Age from which on two robots at their places may be too near for all that poses say, so that they hold each other where
+    /// no node sends both their targets \[s\]; absent where robots are not kept apart, or are predicted.
     pub room_s: Option<f64>,
     /// Time in which the slowest part of a disturbance halves under the simulated delay \[s\].
     pub half_life_s: Option<f64>,
@@ -126,7 +126,7 @@ pub struct SpeedMargin {
     /// formation \[s\].
     pub lag_s: Option<f64>,
     /// Speed of the leaders up to which followers keep within `flight.bounds.affine_error` of their places \[m/s\], at most
-    /// the speed limit, which robots that do not brake share with the periods that their poses are late by; absent without such a bound or a limit, and where followers lag by nothing that could be
+    /// the speed limit; absent without such a bound or a limit, and where followers lag by nothing that could be
     /// measured.
     pub reachable: Option<f64>,
     /// The demands of each manoeuvre.
@@ -215,24 +215,22 @@ fn largest_noise(formation: &Formation, clearance: Option<f64>) -> Option<f64> {
     Some((free / (2.0 * DEVIATIONS_KEPT)).max(0.0))
 }
 
-/// Age of poses at which two robots at their places are perhaps too near \[s\].
+/// Age of poses at which two robots at their places are perhaps too near, where each may be anywhere within the speed limit and the
+/// line between the two is off by as much (see the docs of `swarm::safety`) \[s\].
 fn room_for_delay(formation: &Formation, limits: &Limits) -> Option<f64> {
-    let Formation { places, radii, .. } = formation;
-    let pairs = (0..formation.count()).flat_map(|i| (0..i).map(move |j| (i, j)));
-    let room = |(i, j)| room_between(distance(places.get(i), places.get(j)), radii[i] + radii[j], limits);
-    pairs.map(room).reduce(|a: Option<f64>, b| Some(a?.min(b?))).flatten()
-}
-
-/// The same of two that are so far apart, with radii of so much together \[m\]: each may be anywhere within the speed limit by then,
-/// and the line between the two is off by as much (see the docs of `swarm::safety`).
-fn room_between(apart: f64, radii: f64, limits: &Limits) -> Option<f64> {
     if !limits.keeps_apart || limits.brakes || !limits.speed.is_finite() {
         return None;
     }
-    let keep = radii + limits.clearance + 2.0 * limits.margin();
-    // Where sqrt(apart^2 - off^2) = keep + off.
-    let off = 0.5 * ((2.0 * apart * apart - keep * keep).max(0.0).sqrt() - keep);
-    Some(off.max(0.0) / (2.0 * limits.speed))
+    let Formation { places, radii, .. } = formation;
+    let pairs = (0..formation.count()).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let room = |(i, j)| {
+        let apart = distance(places.get(i), places.get(j));
+        let keep = radii[i] + radii[j] + limits.clearance + 2.0 * limits.margin();
+        // Where sqrt(apart^2 - off^2) = keep + off.
+        let off: f64 = 0.5 * ((2.0 * apart * apart - keep * keep).max(0.0).sqrt() - keep);
+        off.max(0.0) / (2.0 * limits.speed)
+    };
+    pairs.map(room).reduce(f64::min)
 }
 
 /// The reason for which a period is no linear map, as far as the file shows it.
@@ -268,15 +266,12 @@ fn half_life(factor: f64) -> f64 {
 }
 
 fn speed(swarm: &Swarm, formation: &Formation, map: Option<&PeriodMap>, delay: f64) -> SpeedMargin {
-    // A target lies no farther from a late pose than the limit allows in a period; those that brake have places of now.
-    let brakes = matches!(swarm.raw.flight.model, RawModel::DoubleIntegrator);
     let limit = swarm.raw.limits.speed;
-    let kept = limit.map(|limit| if brakes { limit } else { limit / (delay + 1.0) });
     let lag_s =
         map.and_then(PeriodMap::lag).map(|periods| periods * (delay + 1.0) * swarm.raw.control.period);
     let felt = lag_s.filter(|lag| *lag >= LEAST_LAG);
     let by_lag = swarm.raw.flight.bounds.affine_error.zip(felt).map(|(error, lag)| error / lag);
-    let reachable = [kept, by_lag].into_iter().flatten().reduce(f64::min).filter(|speed| speed.is_finite());
+    let reachable = [limit, by_lag].into_iter().flatten().reduce(f64::min).filter(|speed| speed.is_finite());
     let manoeuvres = swarm.manoeuvres.iter().filter_map(|one| needed(formation, &one.name)).collect();
     SpeedMargin { limit, lag_s, reachable, manoeuvres }
 }

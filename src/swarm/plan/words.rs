@@ -60,8 +60,9 @@ impl fmt::Display for SwarmPlan {
             }
         }
         let DelayMargin { largest_s, largest_periods, room_s, .. } = self.delay;
-        let room = room_s
-            .map_or(String::new(), |room| format!("; up to {room:.3} s robots at their places have room"));
+        let room = room_s.map_or(String::new(), |room| {
+            format!("; up to {room:.3} s robots at their places have room where each has a node of its own")
+        });
         line(
             "delay margin",
             format!("poses are used up to an age of {largest_s} s, {largest_periods} periods{room}"),

@@ -55,16 +55,17 @@ pub struct Seen<'a> {
     /// Present velocities \[m/s\]; without them no acceleration is limited. Of members that brake
     /// ([`Limits::brakes`]) places and velocities are to be estimates of the present ones.
     pub velocity: Option<&'a Vectors>,
-    /// What members that brake may do otherwise; nothing without it.
+    /// What members may do otherwise; without it nothing is known of that.
     pub strays: Option<&'a [Stray]>,
 }
 
-/// What a member that brakes may do otherwise than it is seen to.
+/// What a member that brakes may do otherwise than it is seen to; where one may be that does not, and is seen late.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Stray {
     /// Error bound of the way on which it comes to rest, because its velocity is not known exactly \[m\].
     pub error: f64,
-    /// Places where it may be, or come to rest, if it has not done what it was sent to \[m\].
+    /// Places where it may be, or come to rest, if it has not done what it was sent to \[m\]. One that does not brake is
+    /// between them; where there are none it is anywhere within the speed limit.
     pub places: Vec<[f64; 2]>,
 }
 
@@ -97,12 +98,17 @@ pub(super) struct Crowd {
     drift: f64,
     /// Whether members take time to brake.
     pub(super) brakes: bool,
-    /// All that each of those may take until it is at rest; without meaning where they take none.
+    /// All places that each may take until it is at rest; of those that take no time to brake only where they are late.
     pub(super) ways: Vec<Ways>,
     /// Largest distance of such a place from its member \[m\].
     longest: f64,
     /// Members near the current one, in order of index.
     pub(super) found: Vec<u32>,
+}
+
+/// The places of a member's [`Stray`].
+pub(super) fn places<'a>(seen: &Seen<'a>, member: usize) -> &'a [[f64; 2]] {
+    seen.strays.map_or(&[], |strays| &strays[member].places)
 }
 
 /// Swarms below this many members are scanned: a grid costs more.
@@ -180,8 +186,8 @@ impl Filter {
         self.meet(seen, wanted, period);
         safe.clone_from(seen.present);
         for (member, flags) in flags.iter_mut().enumerate() {
-            let (target, changed) = self.target(seen, wanted.get(member), period, member);
-            let target = self.within_speed(seen, target, period, member);
+            let (target, mut changed) = self.target(seen, wanted.get(member), period, member);
+            let target = self.within_speed(seen, target, period, member, &mut changed);
             if seen.known[member] {
                 self.sent_before.set(member, self.sent.get(member));
                 self.sent.set(member, target);
@@ -191,18 +197,41 @@ impl Filter {
         }
     }
 
-    /// Cuts the way from the last target to this one, where the member is at the last one but seen elsewhere, late or
-    /// through noise: the step from where it is seen is not the step it makes. Both ends lie in the cell that its true
-    /// place has, which is convex, so the end of the shorter way does too.
-    fn within_speed(&self, seen: &Seen, target: [f64; 2], period: f64, member: usize) -> [f64; 2] {
-        let last = self.sent.get(member);
-        let is_elsewhere = seen.known[member] && self.is_inexact(seen, period, member);
-        if !self.limits.arrives || !is_elsewhere || !last.iter().all(|x| x.is_finite()) {
+    /// Cuts the way from the last target to this one, where the member is taken to be at the last one but seen elsewhere,
+    /// late or through noise: the step from where it is seen is not the step it makes. Both ends lie in the cell that its
+    /// true place has, which is convex, so the end of the shorter way does too.
+    fn within_speed(
+        &self,
+        seen: &Seen,
+        target: [f64; 2],
+        period: f64,
+        member: usize,
+        flags: &mut Flags,
+    ) -> [f64; 2] {
+        let (here, last) = (seen.present.get(member), self.sent.get(member));
+        let ahead = self.ahead(seen, member);
+        let is_elsewhere = match ahead > 0.0 {
+            // One that has not come so far is given its way from where it is seen.
+            true => distance(here, last) <= self.limits.speed * (period + ahead),
+            false => self.limits.arrives && seen.known[member] && self.is_inexact(seen, period, member),
+        };
+        if !is_elsewhere || !last.iter().all(|x| x.is_finite()) {
             return target;
         }
         let way = [target[0] - last[0], target[1] - last[1]];
         let step = shortened(way, self.limits.speed * period);
-        if step == way { target } else { [last[0] + step[0], last[1] + step[1]] }
+        if step == way {
+            return target;
+        }
+        flags.0 |= Flags::SPEED_LIMITED;
+        [last[0] + step[0], last[1] + step[1]]
+    }
+
+    /// Time for which a member has gone on to its targets since its pose, if they are known \[s\]: by so much farther from
+    /// the pose its target may be.
+    pub(super) fn ahead(&self, seen: &Seen, member: usize) -> f64 {
+        let goes_on = !self.crowd.brakes && !places(seen, member).is_empty();
+        if goes_on && seen.known[member] { seen.ages[member].max(0.0) } else { 0.0 }
     }
 
     /// Whether a member's pose does not say where it is: late, or noisy.
@@ -220,21 +249,23 @@ impl Filter {
         crowd.seen.extend(seen.present.iter().map(|[x, y]| x.is_finite() && y.is_finite()));
         crowd.longest = 0.0;
         self.crowd.brakes = self.brakes(seen);
-        if self.crowd.brakes {
-            self.crowd.ways.resize_with(count, Ways::default);
-            for member in 0..count {
+        self.crowd.ways.resize_with(count, Ways::default);
+        for member in 0..count {
+            let (here, places) = (seen.present.get(member), places(seen, member));
+            if self.crowd.brakes {
                 let rest = self.resting_place(seen, period, member);
-                let places = seen.strays.map_or(&[][..], |strays| &strays[member].places);
-                let ways = &mut self.crowd.ways[member];
-                ways.take(seen.present.get(member), rest, places);
-                self.crowd.longest = self.crowd.longest.max(ways.extent);
+                self.crowd.ways[member].take(here, rest, places);
+                self.crowd.longest = self.crowd.longest.max(self.crowd.ways[member].extent);
+            } else if let Some(&last) = places.last() {
+                self.crowd.ways[member].take(here, last, places);
             }
         }
         if count < GRID_FROM {
             return;
         }
         // As wide as most queries: a member with a way much longer than the mean queries the grid itself.
-        let step = self.limits.speed * period;
+        let oldest = (0..count).map(|member| self.ahead(seen, member)).fold(0.0, f64::max);
+        let step = self.limits.speed * (period + oldest);
         let ways =
             seen.present.iter().zip(wanted.iter()).map(|(here, there)| distance(here, there).min(step));
         let (mut sum, mut finite, mut longest) = (0.0, 0.0, 0.0_f64);
@@ -274,10 +305,20 @@ impl Filter {
         }
     }
 
-    /// Largest distance of a member from its pose \[m\].
+    /// Largest distance of a member from its pose \[m\] by its age.
     pub(super) fn drift(&self, seen: &Seen, member: usize) -> f64 {
         let age = seen.ages[member];
         if self.limits.speed.is_finite() && age > 0.0 { self.limits.speed * age } else { 0.0 }
+    }
+
+    /// The way on which a member is or comes to rest \[m\], and how far it may be from that \[m\].
+    pub(super) fn whereabouts(&self, seen: &Seen, member: usize) -> ([[f64; 2]; 2], f64) {
+        let here = seen.present.get(member);
+        match self.crowd.brakes {
+            true => (self.crowd.ways[member].way, self.drift(seen, member)),
+            false if places(seen, member).is_empty() => ([here; 2], self.drift(seen, member)),
+            false => (self.crowd.ways[member].way, self.crowd.ways[member].beside()),
+        }
     }
 
     /// Whether a member of this radius \[m\] may stand at a place.

@@ -8,7 +8,7 @@
 //!   2017). Of the free gap `d - r_i - r_j - clearance` between two members each takes half. Positions
 //!   alone decide, and of those only the ones in reach: a node that serves one member and hears all
 //!   ([`NodeScope`](super::control::scope::NodeScope)) gives the same bits as one that serves all, except for members
-//!   that brake, whose targets it would have to know.
+//!   that brake or are seen late, whose targets it would have to know.
 //! * **Obstacles and geofence** by the plane through the nearest point of every edge in reach
 //!   ([`Obstacles`]), and a shape cast along the way as a second opinion.
 //! * **Deadlock** by keeping to the right ([`Patience`]).
@@ -32,6 +32,14 @@
 //! every cell that the true places could have. Where that leaves nothing, the member moves only away from
 //! all places where the other may be, or stays: age alone moves no member. This assumes
 //! true ages and a speed limit that all members keep. For obstacles the member's own age counts.
+//!
+//! A loop that sends the targets of both members knows more: each goes straight to one target after the other, at whatever
+//! pace, or stands, and so is in the convex hull `H` of its pose's place, the target that held at that time and the one before
+//! ([`Stray::places`]), and those since. Where `H_i` and `H_j` are `s` apart, and farther than what the ages leave, the normal
+//! through their nearest points parts them, each member takes half of what is left, and its way from anywhere in its hull to a target on
+//! its side stays there. Discs of ages would have two robots that stand hold each other behind poses that are late enough; the hulls of
+//! such are points. Since the target of a member that has gone on is ahead of its pose, it may be as far from that
+//! as the member goes in the pose's age and a period, and from the last target as in a period: late poses slow no member.
 //!
 //! # Members that take time to brake
 //! A double integrator that stands in its cell now may be unable to stay there. The ways on which members come to rest

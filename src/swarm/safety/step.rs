@@ -2,9 +2,9 @@
 
 use super::cell::{HalfPlane, length, shortened};
 use super::deadlock::Tick;
-use super::filter::{Filter, Flags, Seen};
+use super::filter::{Filter, Flags, Seen, places};
 use super::ways::Border;
-use crate::geometry::point::dot;
+use crate::geometry::point::{dot, minus};
 
 /// A member's wanted way at this tick, and its reach.
 #[derive(Clone, Copy)]
@@ -13,7 +13,7 @@ struct MotionRequest {
     way: [f64; 2],
     /// Its length \[m\].
     distance: f64,
-    /// The way in one period by the limits of speed and acceleration \[m\].
+    /// The way in one period by the limits of speed and acceleration \[m\], with that since its pose.
     step: f64,
     /// Radius within which the cell has to be complete \[m\]: the step, and the way it takes to brake after it.
     reach: f64,
@@ -61,7 +61,7 @@ impl Filter {
         }
         let brakes = self.crowd.brakes;
         let motion = self.motion(seen, period, member);
-        let mut request = self.request(motion, way, period);
+        let mut request = self.request(motion, way, period, self.ahead(seen, member));
         let origins = self.enclose(seen, &mut request, member);
         let open = request.open(request.reach);
         let mut flags = self.why(open, origins);
@@ -93,8 +93,8 @@ impl Filter {
         (target, flags)
     }
 
-    fn request(&self, motion: Option<Motion>, way: [f64; 2], period: f64) -> MotionRequest {
-        let (step, distance) = (self.limits.speed * period, length(way));
+    fn request(&self, motion: Option<Motion>, way: [f64; 2], period: f64, ahead: f64) -> MotionRequest {
+        let (step, distance) = (self.limits.speed * (period + ahead), length(way));
         match motion {
             None => MotionRequest { way, distance, step, reach: distance.min(step) },
             Some(Motion { from, velocity }) => {
@@ -154,7 +154,6 @@ impl Filter {
         let drift = self.drift(seen, member);
         let margin = self.limits.margin();
         let brakes = self.crowd.brakes;
-        let rest = if brakes { self.crowd.ways[member].way[1] } else { here };
         for k in 0..self.crowd.found.len() {
             let other = self.crowd.found[k] as usize;
             let stray = drift + self.drift(seen, other);
@@ -162,18 +161,27 @@ impl Filter {
             // Two at the very same place part: the lower number to the left.
             let aside = if member < other { [1.0, 0.0] } else { [-1.0, 0.0] };
             let there = seen.present.get(other);
-            let ways = brakes.then(|| [member, other].map(|m| &self.crowd.ways[m]));
-            if let Some(ways) = ways.filter(|ways| !ways.iter().all(|ways| ways.is_point())) {
-                let places = seen.strays.map_or(&[][..], |strays| &strays[other].places);
-                Border { ways, places, keep, stray, reach }.add(&mut self.cell.planes);
+            let ways = [member, other].map(|m| &self.crowd.ways[m]);
+            let border = Border { ways, places: places(seen, other), keep, stray, reach };
+            let are_between = || [member, other].iter().all(|&m| !places(seen, m).is_empty());
+            let is_added = if brakes {
+                let takes_ways = !ways.iter().all(|ways| ways.is_point());
+                if takes_ways {
+                    border.add(&mut self.cell.planes);
+                }
+                takes_ways
             } else {
+                stray > 0.0 && are_between() && border.add_between(member < other, &mut self.cell.planes)
+            };
+            if !is_added {
                 add_border(&mut self.cell.planes, [here, there, aside], keep, stray, reach);
             }
         }
         let obstacles = self.cell.planes.len();
         let radius = self.radii[member] + margin;
-        let reach = reach + drift;
-        let way = [here, rest];
+        let (way, drift) = self.whereabouts(seen, member);
+        // Its way back begins at the end of that on which it is.
+        let reach = reach + drift + if brakes { 0.0 } else { length(minus(way[1], here)) };
         self.obstacles.planes_near(way, radius + self.limits.clearance, reach, &mut self.cell.planes);
         let fence = self.cell.planes.len();
         self.fence.planes_near(way, radius, reach, &mut self.cell.planes);

@@ -44,6 +44,12 @@ impl Ways {
         self.extent == 0.0
     }
 
+    /// Largest distance of one of its places from the straight way \[m\].
+    pub fn beside(&self) -> f64 {
+        let off = |&corner: &[f64; 2]| length(minus(corner, foot(self.way, corner)));
+        self.corners.iter().map(off).fold(0.0, f64::max)
+    }
+
     /// The pairs of neighbouring corners.
     fn edges(&self) -> impl Iterator<Item = [[f64; 2]; 2]> {
         let count = self.corners.len();
@@ -140,6 +146,27 @@ impl Border<'_> {
         if parted.is_none() || distance < self.keep * (1.0 - TOUCHING) {
             self.add_single(planes);
         }
+    }
+
+    /// Appends the half-plane between members each of which is somewhere on its hull, `is_first` the one of the lower number;
+    /// false, and nothing, where that is no better than what their ages say, or the hulls are nearer than allowed, as noise
+    /// may bring them. Both members find the same.
+    pub fn add_between(&self, is_first: bool, planes: &mut Vec<HalfPlane>) -> bool {
+        let [own, other] = self.ways;
+        // In one order, so that rounding does not make of it two.
+        let found =
+            if is_first { nearest_of(own, other) } else { nearest_of(other, own).map(|[a, b]| [b, a]) };
+        let Some([near, far]) = found else { return false };
+        let way = minus(far, near);
+        let distance = length(way);
+        let seen = length(minus(other.way[0], own.way[0]));
+        let by_age = (seen * seen - self.stray * self.stray).max(0.0).sqrt() - self.stray;
+        if distance < by_age.max(self.keep * (1.0 - TOUCHING)) {
+            return false;
+        }
+        let normal = way.map(|x| x / distance);
+        self.push(planes, normal, (distance - self.keep) / 2.0 + dot(normal, minus(near, own.way[0])));
+        true
     }
 
     /// The nearest points of two straight ways; `None` if they cross.

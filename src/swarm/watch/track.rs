@@ -1,5 +1,5 @@
 //! The present place and velocity of a robot that speeds up and brakes, by its model: from the poses that arrived and
-//! the targets sent since.
+//! the targets sent since. Of a robot that takes no time to brake the same targets say where it may be.
 //!
 //! Two poses give only the mean velocity between them, which is already out of date. The braking distance of a robot
 //! grows with its present velocity, so its model is run beside it: every target moves both, and every pose corrects
@@ -112,6 +112,28 @@ impl Track {
         self.begin(pose);
     }
 
+    /// Takes in a pose that is believed, of a robot that takes no time to brake.
+    pub fn note(&mut self, pose: &Pose) {
+        match self.stamp {
+            Some(since) if since < pose.stamp => self.begin(pose),
+            _ => self.restart(pose),
+        }
+    }
+
+    /// Forgets the targets.
+    pub fn forget(&mut self) {
+        self.sent.clear();
+    }
+
+    /// The places between which such a robot is if it goes straight to its targets: that of its last pose, and those to
+    /// which it was sent since, by commands that take no more than a period to reach it. Empty where they are not known.
+    pub fn between(&self, places: &mut Vec<[f64; 2]>) {
+        if self.sent.front().zip(self.stamp).is_some_and(|((from, _), stamp)| *from <= stamp) {
+            places.push(self.seen);
+            places.extend(self.sent.iter().filter_map(|&(_, target)| target));
+        }
+    }
+
     /// Whether the last pose that was believed is of this place \[m\].
     pub fn is_of(&self, place: [f64; 2]) -> bool {
         self.stamp.is_some() && self.seen == place
@@ -119,7 +141,8 @@ impl Track {
 
     /// Notes the target \[m\] that holds from `now` \[s\] on; `None` where the robot is to come to rest.
     pub fn send(&mut self, now: f64, target: Option<[f64; 2]>) {
-        if target.is_none() && self.sent.back().is_some_and(|(_, last)| last.is_none()) {
+        // Before the first one it goes where it was sent by whoever sent it before, if anybody did.
+        if target.is_none() && self.sent.back().is_none_or(|(_, last)| last.is_none()) {
             return;
         }
         if self.sent.len() == MOST_SENT {
@@ -183,8 +206,8 @@ impl Track {
     /// Takes a pose for the last one.
     fn begin(&mut self, pose: &Pose) {
         (self.stamp, self.seen) = (Some(pose.stamp), pose.position);
-        // The target that holds at that time is still needed.
-        while self.sent.get(1).is_some_and(|&(from, _)| from <= pose.stamp) {
+        // The target that holds at that time is still needed, and the one before, which may still be on its way.
+        while self.sent.get(2).is_some_and(|&(from, _)| from <= pose.stamp) {
             self.sent.pop_front();
         }
     }

@@ -1,9 +1,8 @@
 //! Warnings of what becomes of poses and ranges on their way, and of robots that are not heard.
 
-use super::super::{DEVIATIONS_KEPT, largest_noise, room_between, room_for_delay};
-use super::narrowest;
+use super::super::{DEVIATIONS_KEPT, largest_noise};
 use crate::flock::vectors::distance;
-use crate::scene::swarm::raw::{RawCommandKind, RawFaultKind, RawManoeuvre, RawSwarm};
+use crate::scene::swarm::raw::{RawCommandKind, RawFaultKind, RawSwarm};
 use crate::scene::text::decimals;
 use crate::swarm::flight::Flight;
 use crate::swarm::formation::Formation;
@@ -43,13 +42,7 @@ pub fn of(raw: &RawSwarm, flight: &Flight) -> Vec<String> {
     let formation = flight.control().formation();
     let networks = networks(raw);
     let of_each = networks.iter().flat_map(|network| {
-        [
-            network.noise(raw, formation),
-            network.delay(raw),
-            network.room(raw, flight),
-            network.loss(),
-            network.ranges(raw),
-        ]
+        [network.noise(raw, formation), network.delay(raw), network.loss(), network.ranges(raw)]
     });
     let others = [silent(raw, flight), never_heard(raw, flight), unmeasured(raw, formation)];
     of_each.chain(others).flatten().collect()
@@ -81,33 +74,6 @@ impl Network {
                 "jitter makes some poses older than poses.age_limit: robots will be lost for periods at a time; lower \
                  flight.jitter{} or raise the limit",
                 if *key == "flight" { String::new() } else { format!(" or {key}.delay") }
-            )
-        })
-    }
-
-    /// Robots at their places that hold each other, as each may be anywhere within the speed limit.
-    fn room(&self, raw: &RawSwarm, flight: &Flight) -> Option<String> {
-        /// Part of the room that is left to robots, which are nearer to each other than their places where one lags.
-        const LEFT: f64 = 0.75;
-        let late = f64::from(self.delay + self.jitter) * raw.control.period;
-        // All pairs, in all manoeuvres, are compared only where it matters.
-        if late == 0.0 {
-            return None;
-        }
-        let (formation, limits) = (flight.control().formation(), flight.control().limits());
-        let of_manoeuvre = |one: &RawManoeuvre| {
-            let (free, i, j) = narrowest(formation, &formation.manoeuvre(&one.name, 0.0)?)?;
-            let radii = formation.radii[i] + formation.radii[j];
-            room_between(free + radii, radii, limits)
-        };
-        let room =
-            raw.manoeuvres.iter().filter_map(of_manoeuvre).fold(room_for_delay(formation, limits)?, f64::min);
-        (late > LEFT * room).then(|| {
-            format!(
-                "behind poses {late:.3} s old robots at their places have little room, and none behind poses of {room:.3} s, since \
-                 they may be anywhere within limits.speed: they may stand or wander; lower {}.delay or limits.speed, or space \
-                 the robots out",
-                self.key
             )
         })
     }

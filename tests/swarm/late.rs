@@ -1,0 +1,94 @@
+//! Poses that are late: the places to which robots were sent since say where these are.
+
+use flockform::flock::vectors::distance;
+use flockform::swarm::control::Control;
+use flockform::swarm::watch::Pose;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+use super::support::*;
+use super::swarms::load_swarm;
+
+const PERIOD: f64 = 0.1;
+const ROBOTS: usize = 8;
+
+/// Robots on a circle that all lead.
+fn circle(model: &str) -> Control {
+    let place = |k: usize| {
+        let angle = k as f64 / ROBOTS as f64 * std::f64::consts::TAU;
+        format!("{{ name = \"r{k}\", place = [{:?}, {:?}] }}", 2.5 * angle.cos(), 2.5 * angle.sin())
+    };
+    let names: Vec<String> = (0..ROBOTS).map(|k| format!("\"r{k}\"")).collect();
+    let text = format!(
+        "title = \"circle\"\nradius = 0.15\nlinks = {{ kind = \"nearest\", count = 1 }}\nrobots = [{}]\n\
+         leaders = [{{ robots = [{}], program = {{ kind = \"external\" }} }}]\n\
+         limits = {{ speed = 1.0, clearance = 0.1 }}\ncontrol = {{ period = {PERIOD} }}\nflight = {{ model = {{ kind = \"{model}\" }} }}\n",
+        (0..ROBOTS).map(place).collect::<Vec<_>>().join(", "),
+        names.join(", ")
+    );
+    Control::new(&parse(&text).expect("a swarm")).expect("laid out")
+}
+
+/// Whatever the pace at which robots go straight to their targets, some of them not at all for a while, and whether a command
+/// is there at once or a period later.
+#[test]
+fn robots_of_any_pace_keep_clear_behind_late_poses_and_commands() {
+    let mut met = f64::INFINITY;
+    for seed in 0..24 {
+        let mut random = Pcg64Mcg::seed_from_u64(seed);
+        let (delay, late) = ([1, 3, 6][seed as usize % 3], seed as usize / 3 % 2);
+        let mut control = circle(if seed % 2 == 0 { "integrator" } else { "unicycle" });
+        let places = control.formation().places.clone();
+        for k in 0..ROBOTS {
+            let [x, y] = places.get(k);
+            let shaken = |x: f64, random: &mut Pcg64Mcg| -x + random.random_range(-0.5..0.5);
+            let goal = [shaken(x, &mut random), shaken(y, &mut random)];
+            assert!(control.place_leader(k, goal));
+        }
+        let mut poses = vec![places; 1];
+        let mut sent: Vec<Vec<Option<[f64; 2]>>> = Vec::new();
+        for tick in 0usize..300 {
+            let now = tick as f64 * PERIOD;
+            if let Some(old) = tick.checked_sub(delay) {
+                for k in 0..ROBOTS {
+                    let stamp = old as f64 * PERIOD;
+                    let pose = Pose { position: poses[old].get(k), yaw: 0.0, stamp, frame_is_right: true };
+                    control.receive(k, pose, now).expect("a pose");
+                }
+            }
+            control.tick(now);
+            sent.push((0..ROBOTS).map(|k| control.target(k)).collect());
+            let mut next = poses[tick].clone();
+            for k in 0..ROBOTS {
+                // Of each ten periods one stands in one, another in the next one.
+                let stands = (tick / 10) % ROBOTS == k;
+                let pace: f64 = if stands { 0.0 } else { random.random_range(0.3..1.0) };
+                let Some(target) = tick.checked_sub(late).and_then(|then| sent[then][k]) else { continue };
+                let here = next.get(k);
+                let way = distance(here, target);
+                let share = if way > 0.0 { (pace * PERIOD / way).min(1.0) } else { 0.0 };
+                next.set(k, [0, 1].map(|axis| here[axis] + share * (target[axis] - here[axis])));
+            }
+            for (a, b) in (0..ROBOTS).flat_map(|a| (0..a).map(move |b| (a, b))) {
+                let gap = distance(next.get(a), next.get(b)) - 0.3;
+                assert!(gap >= 0.1 - 1e-9, "seed {seed}, tick {tick}: r{a} and r{b} {gap} m apart");
+                met = met.min(gap);
+            }
+            poses.push(next);
+        }
+        let [begin, end] = [0, 300].map(|tick| poses[tick].get(0));
+        assert!(distance(begin, end) > 2.0, "seed {seed}: it stays near {begin:?}");
+    }
+    assert!(met < 0.12, "they met: {met}");
+}
+
+/// Discs that grow with the ages of poses filled the gap, and the robots stood before it, or wandered.
+#[test]
+fn swarms_with_late_poses_fly_as_others_do() {
+    for (swarm, delay, most) in [("square", 8, 0.1), ("gap", 3, 0.6)] {
+        let model = "flight.model={ kind = \"integrator\" }";
+        let (_, report) = flown(&load_swarm(swarm, &[&format!("flight.delay={delay}"), model]));
+        let [largest, last] = report.formation_error.expect("measured");
+        assert!(largest < most && last < 1e-6, "{swarm}: {largest} m, {last} m");
+    }
+}
