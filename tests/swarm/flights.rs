@@ -178,9 +178,14 @@ fn robots_whose_acceleration_is_limited_arrive_however_late_or_noisy_their_poses
 fn a_flight_whose_leader_or_whose_poses_never_arrive_has_no_final_error_that_holds() {
     let bound = "[flight.bounds]\nfinal_error = 0.05\n";
     // Too fast to follow; poses that are all lost, or too old when they come.
-    let stuck = "faults = [{ robot = \"a\", at = 1.0, what = { kind = \"stuck\" } }]";
-    for (fault, found) in [(stuck, true), ("loss = 1.0", false), ("delay = 30", false)] {
-        let swarm = parse(&format!("{ROW}{fault}\n{bound}")).unwrap_or_else(|error| panic!("{error}"));
+    let cases = [
+        ("speed = 0.2", "", true),
+        ("speed = 1.0", "loss = 1.0", false),
+        ("speed = 1.0", "delay = 30", false),
+    ];
+    for (limit, fault, found) in cases {
+        let text = format!("{ROW}{fault}\n{bound}").replace("speed = 1.0", limit);
+        let swarm = parse(&text).unwrap_or_else(|error| panic!("{error}"));
         let (_, report) = flown(&swarm);
         let [verdict] = &report.bounds[..] else { panic!("{:?}", report.bounds) };
         assert!(!verdict.holds, "{fault}: {verdict:?}");

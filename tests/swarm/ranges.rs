@@ -39,13 +39,14 @@ fn fly(flight: &mut Flight) -> f64 {
 /// The formation leaves its liar behind, out of all others' reach, and comes back past it after a minute.
 #[test]
 fn a_liar_is_kept_clear_of_to_the_end_of_the_flight() {
+    let ranges = RANGES.replace("3.5", "3.0");
     // One that sends its place again and again stays there: a lie within the tolerance, by which the clearance is less.
     for (what, is_found) in
         [("{ kind = \"offset\", by = [1.2, 0.0] }", true), ("{ kind = \"frozen\" }", false)]
     {
         for seed in ["flight.seed=0", "flight.seed=1"] {
             let fault = format!("flight.faults=[{{ robot = \"robot_13\", at = 3.0, what = {what} }}]");
-            let mut flight = square(&[&fault, RANGES, seed]);
+            let mut flight = square(&[&fault, &ranges, seed]);
             let (mut nearest, mut hidden) = (f64::INFINITY, 0.0_f64);
             while flight.fleet().period() < flight.periods() {
                 nearest = nearest.min(step(&mut flight));

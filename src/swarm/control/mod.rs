@@ -466,7 +466,8 @@ impl Control {
             let follows = self.serves[member] && track.is_of(self.present.get(member));
             if !self.brakes {
                 stray.places.clear();
-                if follows && self.ages[member] > 0.0 {
+                // One that is lost, or found to lie, need not do what it was sent to.
+                if follows && self.usable[member] && self.ages[member] > 0.0 {
                     track.between(&mut stray.places);
                 }
                 continue;

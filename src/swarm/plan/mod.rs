@@ -23,7 +23,6 @@ use serde::Serialize;
 use super::formation::Formation;
 use crate::flock::vectors::distance;
 use crate::scene::SceneError;
-use crate::scene::swarm::raw::RawModel;
 use crate::scene::swarm::{Shape, Swarm};
 use crate::solve::spectrum::LinearSweep;
 use crate::swarm::flight::Flight;

@@ -1,6 +1,6 @@
 //! The filter: one pass over the members, each with a cell of its own.
 
-use super::cell::{Cell, length, shortened};
+use super::cell::{Cell, HalfPlane, length, shortened};
 use super::deadlock::Detour;
 use super::limits::{Limits, SafetyError};
 use super::obstacles::Obstacles;
@@ -9,6 +9,7 @@ use super::ways::Ways;
 use crate::flock::grid::CellGrid;
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::vectors::{Vectors, distance};
+use crate::geometry::point::{dot, minus};
 
 /// The reasons for changing a target, and other events of a tick, as bits that may be combined; those of the message `flockform_msgs/MemberState`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -210,10 +211,10 @@ impl Filter {
     ) -> [f64; 2] {
         let (here, last) = (seen.present.get(member), self.sent.get(member));
         let ahead = self.ahead(seen, member);
-        let is_elsewhere = match ahead > 0.0 {
+        let is_elsewhere = match self.limits.arrives {
+            true => seen.known[member] && (ahead > 0.0 || self.is_inexact(seen, period, member)),
             // One that has not come so far is given its way from where it is seen.
-            true => distance(here, last) <= self.limits.speed * (period + ahead),
-            false => self.limits.arrives && seen.known[member] && self.is_inexact(seen, period, member),
+            false => ahead > 0.0 && distance(here, last) <= self.limits.speed * (period + ahead),
         };
         if !is_elsewhere || !last.iter().all(|x| x.is_finite()) {
             return target;
@@ -224,7 +225,16 @@ impl Filter {
             return target;
         }
         flags.0 |= Flags::SPEED_LIMITED;
-        [last[0] + step[0], last[1] + step[1]]
+        let place = [last[0] + step[0], last[1] + step[1]];
+        // One that lags behind its targets need not have the cell in which the last one was.
+        let out = minus(place, here);
+        let leaves =
+            |plane: &HalfPlane| dot(plane.normal, out) > plane.offset.max(0.0) + TOUCHING * length(out);
+        if !self.limits.arrives && self.cell.planes.iter().any(leaves) {
+            let step = shortened(minus(target, here), self.limits.speed * period);
+            return [here[0] + step[0], here[1] + step[1]];
+        }
+        place
     }
 
     /// Time for which a member has gone on to its targets since its pose, if they are known \[s\]: by so much farther from
