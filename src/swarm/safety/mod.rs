@@ -96,7 +96,7 @@
 //! declared clearance in all of the random flights that begin with it, late poses or not (`tests/swarm_safety`). Two
 //! cases are not covered. In a gap between solids that is narrower than the widened distances the way out is
 //! undetermined, and noise leads a member deeper. Late poses of members that take no time to brake carry the noise of
-//! several periods: in 2 of 60 random flights, with 3 periods and 2 cm, two came 5 cm nearer than declared.
+//! several periods: in 1 of 90 random flights, with 3 periods and 2 cm, two came 2.5 cm nearer than declared.
 //!
 //! # Lying members
 //! A pose that is farther from the last one than the speed limit allows, and half a metre of noise, is not accepted
