@@ -81,6 +81,148 @@ fn a_role_can_be_taken_by_rule_particle_by_particle() {
     assert!((dx - 1.8).abs() < 1e-12, "{dx}");
 }
 
+/// A grid on a square lattice of spacing 1, its left side clamped and its right one led, with more keys; each with a `;` a line.
+fn pulled(size: [usize; 2], per_step: f64, more: &str) -> Scene {
+    let [columns, rows] = size;
+    let text = format!(
+        "title = 'pulled'; lattice = {{ kind = 'square', spacing = 1.0 }}
+         body = {{ shape = {{ kind = 'grid', columns = {columns}, rows = {rows} }} }}
+         [[roles]]; region = {{ kind = 'edge', side = 'left' }}; role = 'clamped'
+         [[roles]]; region = {{ kind = 'edge', side = 'right' }}; role = 'leader'
+         motion = {{ kind = 'velocity', per_step = [{per_step}, 0.0] }}
+         {more}"
+    );
+    parsed(&text.replace(';', "\n"))
+}
+
+fn parsed(text: &str) -> Scene {
+    Scene::parse("scene", "scene.toml", text, &[], None).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn run_out(scene: &Scene) -> Outcome {
+    run(planned(scene), &mut |_, _| ControlFlow::Continue(()))
+}
+
+const RIGHT: &str = "[[roles]]; region = { kind = 'edge', side = 'right' };";
+
+#[test]
+fn a_leader_turns_to_another_motion_on_a_condition() {
+    let turn = "role = 'leader'; motion = { kind = 'velocity', per_step = [0.0, 0.1] }";
+    let more = format!("{RIGHT} {turn}; when = {{ quantity = 'x', above = 3.95 }}; [stop]; steps = 30");
+    let outcome = run_out(&pulled([4, 3], 0.1, &more));
+    let [x, y] = outcome.engine.present().get(11);
+    assert!((x - 4.0).abs() < 1e-12 && (y - 4.0).abs() < 1e-12, "{x} {y}");
+}
+
+#[test]
+fn a_condition_takes_no_particle_from_a_later_entry() {
+    let hold = "role = 'clamped'; when = { quantity = 'displacement', above = 0.5 }";
+    let more = format!("{RIGHT} {hold}; {RIGHT} role = 'follower'; from = 30; [stop]; steps = 31");
+    let outcome = run_out(&pulled([4, 3], 0.1, &more));
+    assert!(outcome.engine.roles()[9..].iter().all(|role| *role == Role::Follower));
+}
+
+#[test]
+fn rest_is_no_equilibrium_before_the_step_of_a_condition() {
+    let led = "role = 'leader'; motion = { kind = 'keyframes', frames = [{ step = 1, displacement = [1.0, 0.0] }] }";
+    let freed = "role = 'follower'; from = 100; when = { quantity = 'displacement', above = 0.5 }";
+    let more = format!("{RIGHT} {led}; {RIGHT} {freed}; [stop]; steps = 2000; tolerance = 1e-3");
+    let outcome = run_out(&pulled([9, 2], 0.0, &more));
+    assert_eq!(outcome.reason, StopReason::Equilibrium);
+    assert!(outcome.engine.step() > 100 && outcome.engine.step() < 2000, "step {}", outcome.engine.step());
+    assert_eq!(outcome.engine.roles()[17], Role::Follower);
+}
+
+#[test]
+fn a_ghost_among_neighbours_that_are_found_anew_is_seen_by_none() {
+    let outcome =
+        outcome("drop", &["roles=[{region={kind='ids',ids=[9]},role='ghost',from=3}]", "stop.steps=6"]);
+    let engine = &outcome.engine;
+    let ghost = engine.roles().iter().position(|role| *role == Role::Ghost).expect("a ghost");
+    assert!(!engine.flock().neighbours.index.contains(&(ghost as u32)));
+    assert_eq!(engine.step(), 6);
+}
+
+#[test]
+fn a_radius_that_is_a_spacing_holds_the_nearest_now_as_at_rest() {
+    let text = |kind: &str| {
+        format!(
+            "title = 'radius'\nlattice = {{ kind = 'square', spacing = 0.1 }}\nstop.steps = 1\n\
+             body = {{ shape = {{ kind = 'grid', columns = 8, rows = 6 }} }}\n\
+             neighbours = {{ kind = '{kind}', radius = 0.1 }}\n\
+             roles = [{{ region = {{ kind = 'all' }}, role = 'clamped' }}]"
+        )
+    };
+    let entries = |kind: &str| run_out(&parsed(&text(kind))).engine.flock().neighbours.index.len();
+    assert_eq!([entries("within"), entries("dynamic")], [164; 2]);
+}
+
+#[test]
+fn every_particle_of_a_narrow_body_is_on_its_boundary() {
+    for (lattice, size, count) in [
+        ("square", [8, 1], 8),
+        ("square", [8, 2], 16),
+        ("hexagonal", [8, 2], 16),
+        ("honeycomb", [8, 2], 11),
+        ("square", [8, 3], 18),
+    ] {
+        let [columns, rows] = size;
+        let text = format!(
+            "title = 'narrow'\nlattice = {{ kind = '{lattice}', spacing = 1.0 }}\n\
+             body = {{ shape = {{ kind = 'grid', columns = {columns}, rows = {rows} }} }}\n\
+             roles = [{{ region = {{ kind = 'boundary' }}, role = 'clamped' }}]"
+        );
+        let roles = planned(&parsed(&text)).setup.roles;
+        let clamped = roles.iter().filter(|role| **role == Role::Clamped).count();
+        assert_eq!(clamped, count, "{lattice} {size:?}");
+    }
+}
+
+#[test]
+fn a_body_that_diverged_has_the_energies_of_its_last_good_step() {
+    let grown = "[rule]; feedback = { factor = 0.8 }; [stop]; steps = 500";
+    let mut seen = Vec::new();
+    let outcome = run(planned(&pulled([6, 5], 0.1, grown)), &mut |engine, _| {
+        seen.push(engine.energies());
+        ControlFlow::Continue(())
+    });
+    assert!(matches!(outcome.reason, StopReason::Diverged(_)), "{:?}", outcome.reason);
+    let [_, pe2] = outcome.engine.energies();
+    assert!(pe2 > 0.0);
+    assert_eq!(outcome.engine.energies(), seen[outcome.engine.step()]);
+}
+
+#[test]
+fn a_plan_and_a_run_caution_against_what_does_not_suit_the_body() {
+    let cautions =
+        |scene: &Scene| PlanReport::new(scene, &planned(scene)).expect("planned").cautions.join("\n");
+    let short = cautions(&pulled([6, 4], 0.1, "[fracture]; distance = 0.9"));
+    assert!(short.contains("fracture.distance = 0.9") && short.contains("38 bonds"), "{short}");
+    assert!(!cautions(&pulled([6, 4], 0.1, "[fracture]; distance = 1.1")).contains("fracture.distance"));
+    let world = "[rule]; mean = { kind = 'geometric', origin = 'world' };";
+    let unmoved = cautions(&pulled([4, 3], 0.1, world));
+    assert!(!unmoved.contains("followers"), "{unmoved}");
+    let negative = parsed(&negative(world));
+    let unmoved = cautions(&negative);
+    assert!(unmoved.contains("4 of 6 followers"), "{unmoved}");
+    // Along the other axis they do.
+    let moved = run_out(&negative);
+    let [dx, dy] = displacement(&moved.engine, 4);
+    assert!(dx > 0.0 && dy == 0.0, "{dx} {dy}");
+}
+
+/// The lowest row and its particles' neighbours below zero.
+fn negative(world: &str) -> String {
+    format!(
+        "title = 'negative'\nlattice = {{ kind = 'square', spacing = 1.0 }}\n\
+         body = {{ shape = {{ kind = 'grid', columns = 4, rows = 3 }}, anchor = [1.0, -0.5] }}\n\
+         roles = [\n{{ region = {{ kind = 'edge', side = 'left' }}, role = 'clamped' }},\n\
+         {{ region = {{ kind = 'edge', side = 'right' }}, role = 'leader', \
+         motion = {{ kind = 'velocity', per_step = [0.1, 0.0] }} }}]\nstop.steps = 4\n{}",
+        world.replace(';', "\n")
+    )
+}
+
 #[test]
 fn a_new_motion_starts_from_where_the_leader_stands() {
     let second = r#"roles[2]={from=11,region={kind="edge",side="right"},role="leader",motion={kind="keyframes",frames=[{step=5,displacement=[0.0,2.0]}]}}"#;

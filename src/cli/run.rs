@@ -42,7 +42,7 @@ use super::output::{FigureArguments, OutputArguments, ReportArguments, command_l
 use super::progress::Progress;
 use super::ranks::{self, Interrupted, RanksError, Start};
 use super::recording::{RecordArguments, close};
-use super::{FAILED, Refusal, interrupt, memory};
+use super::{FAILED, Refusal, interrupt, memory, on_terminal};
 
 #[derive(Debug, Args)]
 #[command(mut_arg("set", |set| set.requires("scene")))]
@@ -307,6 +307,9 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     let closing =
         || words + &closing_words(&scene, &outcome, &summary, elapsed) + &where_to_look(&kept) + &recorded;
     let is_whole = finish.done(film, drawn, || serde_json::json!(Signed::new(&summary)), closing)?;
+    if arguments.output.quiet && !is_interrupted && !outcome.reason.is_good() {
+        note!("error: {}", on_terminal(&format!("{}: {}", scene.name, outcome.reason)));
+    }
     Ok(if is_whole { exit_code(&outcome) } else { ExitCode::from(FAILED) })
 }
 

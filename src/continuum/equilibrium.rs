@@ -14,12 +14,13 @@ use crate::engine::setup::Setup;
 use crate::engine::shared::Agreed;
 use crate::engine::state::EngineState;
 use crate::flock::role::Role;
+use crate::flock::rules::Rule;
 use crate::flock::vectors::{Vectors, distance};
 use crate::ranks::Team;
 use crate::scene::{LoadSteps, Scene, SceneError};
 use crate::solve::corotated::{self, CorotatedError, Way};
 use crate::solve::equilibrium::{Choice, Request, SolveError, Solved, Solver, System, choose, solve_shared};
-use crate::solve::linear::{HeldComponent, NotLinear, system};
+use crate::solve::linear::{HeldComponent, NotLinear, overshoot, system};
 use crate::solve::shared::SystemPart;
 
 /// Runs a plan to its end as its scene asks: stepping, or straight to the equilibrium under the whole load. `see` sees each step of
@@ -264,6 +265,14 @@ fn refuse(scene: &Scene, error: &SolveError) -> SceneError {
         (_, true) => "try equilibrium.solver = \"direct\", a larger lattice.spacing, or more supports",
         (_, false) => "choose another equilibrium.solver, or equilibrium.solver = \"auto\"",
     };
+    // Between -1 and 0 it makes a body only more stable: what is wrong there lies elsewhere.
+    let stretch = overshoot(&Rule { feedback: scene.feedback, ..Rule::BARYCENTRE });
+    if !(stretch > 0.0 && stretch <= 1.0) {
+        let message =
+            format!("{error}; feedback from the initial place stretches every displacement by {stretch}");
+        let help = "give a factor between -1 and 0, or leave the feedback out";
+        return scene.refuse("rule.feedback.factor", message, help);
+    }
     scene.refuse("equilibrium", error.to_string(), help)
 }
 

@@ -13,6 +13,7 @@ pub(crate) mod cuts;
 mod damping;
 pub mod deviation;
 pub mod digest;
+pub(crate) mod doubts;
 mod edge_stress;
 pub mod equilibrium;
 pub(crate) mod late;

@@ -469,7 +469,9 @@ fn flock(
     let needs_bonds = scene.fracture.is_some()
         || !scene.cuts.is_empty()
         || scene.actions.iter().any(Action::is_cut)
-        || scene.roles.iter().any(|entry| entry.role == Role::Ghost);
+        // Neighbours that are found anew leave ghosts out by themselves.
+        || !matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. })
+            && scene.roles.iter().any(|entry| entry.role == Role::Ghost);
     let bonds = needs_bonds.then(|| {
         let (threshold, ghosts) =
             scene.fracture.map_or((None, Ghosts::Lattice), |fracture| (fracture.threshold, fracture.ghosts));

@@ -6,6 +6,7 @@ use super::active_share::active_share;
 use super::bulk_response;
 use super::cuts;
 use super::deviation::{Deviation, pieces};
+use super::doubts;
 use super::edge_stress;
 use super::equilibrium::select_solver;
 use super::late;
@@ -185,6 +186,7 @@ fn facts(
         (None, None) => format!("after {} steps", plan.stop.steps),
     };
     let bonds = neighbour_entries(plan);
+    let about = if plan.setup.present_radius.is_some() { "about " } else { "" };
     let unit = scene.unit();
     let apart = plan.setup.body.lattice.spacing();
     let lattice = if scene.is_of_points() {
@@ -202,7 +204,10 @@ fn facts(
     let first = [
         ("particles", format!("{} ({})", plan.count(), roles.join(", "))),
         ("lattice", lattice),
-        ("neighbour entries", format!("{bonds} ({:.2} a particle)", bonds as f64 / plan.count() as f64)),
+        (
+            "neighbour entries",
+            format!("{about}{bonds} ({:.2} a particle)", bonds as f64 / plan.count() as f64),
+        ),
     ];
     let moving = active_share(plan, &sweep).filter(|_| scene.equilibrium.is_none()).map(|share| {
         (
@@ -282,6 +287,7 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
     cautions.extend(dead_pressure(scene));
     cautions.extend(uneven_sides(scene));
     cautions.extend(late::cautions(scene));
+    cautions.extend(doubts::planned(scene, &plan.setup));
     cautions.extend(cuts::planned(scene, &plan.setup.body, &plan.setup.flock.neighbours));
     if let (Some(edge), Some(cells)) = (&plan.setup.free_edge, &plan.setup.cells) {
         let body = &plan.setup.body;

@@ -241,7 +241,7 @@ fn run_loop(
             engine.gather();
         }
         if let Some(divergence) = divergence(&engine, &movement, *divergence_ratio) {
-            engine.undo_step();
+            batch.undo(&mut engine);
             break StopReason::Diverged(divergence);
         }
         residual = movement.largest_move;

@@ -37,8 +37,17 @@ pub fn of_body(
             let weight = |j: usize, k: u32| {
                 (distance(body.reference.get(j), body.reference.get(k as usize)) / spacing).powf(*power)
             };
-            let all = (0..body.count()).flat_map(|j| neighbours.of(j).iter().map(move |&k| weight(j, k)));
-            Ok(Weights::Scalar(all.collect()))
+            let weights: Vec<f64> =
+                (0..body.count()).flat_map(|j| neighbours.of(j).iter().map(move |&k| weight(j, k))).collect();
+            let sums = |i: usize| weights[neighbours.bonds(i)].iter().sum::<f64>();
+            let is_lost =
+                |&i: &usize| !neighbours.of(i).is_empty() && !(sums(i) > 0.0 && sums(i).is_finite());
+            if let Some(i) = body.exact().find(is_lost) {
+                let message =
+                    format!("the weights of the neighbours of particle {} add up to {}", body.id(i), sums(i));
+                return Err(scene.refuse("rule.weights.power", message, "give a power nearer to 0"));
+            }
+            Ok(Weights::Scalar(weights))
         }
         Some(FixedWeights::List(values)) => {
             let offsets = scene.neighbourhood.offsets(&scene.lattice).unwrap_or_default();

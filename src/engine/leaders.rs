@@ -35,7 +35,11 @@ impl Engine {
             // The ranks that have no particle of it compile their sweeps with the others.
             let Some(taking) = self.taking(change) else { continue };
             for &which in &taking {
-                self.roles[self.changes[change].particles[which]] = self.changes[change].role;
+                let particle = self.changes[change].particles[which];
+                self.roles[particle] = self.changes[change].role;
+                if let Some(last) = self.taken_by.get_mut(particle) {
+                    *last = (*last).max(change as u32 + 1);
+                }
             }
             self.start_leading(change, &taking, self.step - 1);
             let role = self.changes[change].role.name();
@@ -47,9 +51,23 @@ impl Engine {
         }
     }
 
-    /// Which of a change's particles take its role at this step; `None` if none of the whole body do.
+    /// What [`Engine::taken_by`] is before the first step.
+    pub(super) fn taken_at_once(&self) -> Vec<u32> {
+        if self.changes.iter().all(|change| change.when.is_none()) {
+            return Vec::new();
+        }
+        let mut taken_by = vec![0; self.roles.len()];
+        let at_once = |change: &&RoleChange| change.is_at_once() && change.axis.is_none();
+        for (change, number) in self.changes.iter().zip(1..).filter(|(change, _)| at_once(change)) {
+            change.particles.iter().for_each(|&particle| taken_by[particle] = number);
+        }
+        taken_by
+    }
+
+    /// Which of a change's particles take its role at this step; `None` if none of the whole body do. By a condition it
+    /// takes each of them once, and none that a later one has taken.
     fn taking(&self, change: usize) -> Option<Vec<usize>> {
-        let RoleChange { particles, role, from, when, .. } = &self.changes[change];
+        let RoleChange { particles, from, when, .. } = &self.changes[change];
         match when {
             // Those from the start hold already.
             None => (*from == self.step && *from > 1).then(|| (0..particles.len()).collect()),
@@ -58,7 +76,7 @@ impl Engine {
                 let meets = |&which: &usize| {
                     let particle = particles[which];
                     owned.contains(&particle)
-                        && self.roles[particle] != *role
+                        && self.taken_by.get(particle).is_none_or(|&last| last as usize <= change)
                         && condition.holds(self.quantity(condition.quantity, particle))
                 };
                 let own: Vec<usize> = (0..particles.len()).filter(meets).collect();

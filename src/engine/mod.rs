@@ -58,6 +58,9 @@ pub struct Engine {
     takes_several: bool,
     roles: Vec<Role>,
     changes: Vec<RoleChange>,
+    /// Which of the changes that have taken a particle was written last, counted from 1; 0 for none, shape \[count\].
+    /// Empty where no change has a condition.
+    taken_by: Vec<u32>,
     /// By ascending step.
     actions: Vec<Action<Arc<Conduct>>>,
     /// By particle.
@@ -141,6 +144,7 @@ impl Engine {
             flock,
             update,
             roles,
+            taken_by: Vec::new(),
             changes,
             actions,
             leaders: Vec::new(),
@@ -173,6 +177,7 @@ impl Engine {
                 }
             }
         }
+        engine.taken_by = engine.taken_at_once();
         engine.after_role_change();
         engine.begin_probes(probes);
         engine
@@ -372,7 +377,8 @@ impl Engine {
 
     /// Whether a role change or a leader's motion is still to come, so that rest is no equilibrium.
     pub(crate) fn is_scheduled(&self) -> bool {
-        let waits = |change: &RoleChange| change.when.is_none() && change.from > self.step.max(1);
+        // Once its step is past, a condition that does not hold at rest never will.
+        let waits = |change: &RoleChange| change.from > self.step.max(1);
         self.changes.iter().any(waits)
             || self.next_action().is_some()
             || self.load.is_growing(self.step)

@@ -18,7 +18,7 @@ pub struct StepBatch {
     bound: f64,
     /// How far a step takes particles from the reference, if that is known.
     reach: Option<Reach>,
-    /// Where a batch began, if it may have gone too far.
+    /// Where a batch began, if it may have gone too far, or the positions before those from which a step may diverge.
     start: Vectors,
     /// Steps to be taken one at a time.
     single_steps: usize,
@@ -38,12 +38,24 @@ impl StepBatch {
     fn quiet_until(&self, engine: &Engine, look: usize) -> usize {
         let (Some(reach), 0) = (self.reach, self.single_steps) else { return engine.step() };
         let count = engine.steps_at_once(look - engine.step());
+        engine.step() + if self.may_diverge(engine, reach, count) { 0 } else { count }
+    }
+
+    /// Whether so many steps may take a particle beyond the bound.
+    fn may_diverge(&self, engine: &Engine, reach: Reach, count: usize) -> bool {
         let spacing = engine.body().lattice.spacing();
         let from = f64::max(self.displacement * spacing, engine.leaders_reach(count));
         let farthest = reach.after(count, from) / spacing;
         // That is along each axis; along both at once, within the diagonal.
-        let may_diverge = farthest * std::f64::consts::SQRT_2 * (1.0 + 1e-9) > self.bound;
-        engine.step() + if may_diverge { 0 } else { count }
+        farthest * std::f64::consts::SQRT_2 * (1.0 + 1e-9) > self.bound
+    }
+
+    /// Takes the last step back, which diverged: the positions before the one that is then the last are known again.
+    pub fn undo(&self, engine: &mut Engine) {
+        engine.undo_step();
+        if self.start.len() == engine.previous.len() {
+            engine.previous.clone_from(&self.start);
+        }
     }
 
     /// Takes at least one step, and none beyond `look`; returns how the last one moved the body.
@@ -52,6 +64,11 @@ impl StepBatch {
         if until < step + 2 {
             self.single_steps = self.single_steps.saturating_sub(1);
             let acts = engine.acts_next();
+            let may_diverge = |reach| self.may_diverge(engine, reach, 1);
+            if engine.steps_at_once(1) == 0 || self.reach.is_none_or(may_diverge) {
+                engine.gather();
+                self.start.clone_from(&engine.previous);
+            }
             engine.advance();
             // Another rule takes particles another distance.
             if acts && self.reach.is_some() {

@@ -29,6 +29,8 @@ pub struct EngineState<'a> {
     previous: Cow<'a, Vectors>,
     #[serde(with = "serde_impls::roles")]
     roles: Cow<'a, [Role]>,
+    /// Of each particle the last change that has taken it; empty where no change has a condition.
+    taken_by: Cow<'a, [u32]>,
     leaders: Vec<Led>,
     guided: Cow<'a, [(usize, [f64; 2])]>,
     #[serde(with = "serde_impls::breaks")]
@@ -79,6 +81,10 @@ impl<'a> EngineState<'a> {
                 None => Cow::Borrowed(&engine.roles),
                 Some(_) => Cow::Owned(own.iter().map(|&i| engine.roles[i]).collect()),
             },
+            taken_by: match body.part {
+                None => Cow::Borrowed(&engine.taken_by),
+                Some(_) => own.iter().filter_map(|&i| engine.taken_by.get(i).copied()).collect(),
+            },
             leaders: leaders.map(leading).collect(),
             guided: Cow::Borrowed(&engine.guided),
             breaks: Cow::Borrowed(&engine.breaks),
@@ -92,13 +98,25 @@ impl<'a> EngineState<'a> {
 
     /// The state for later, when the engine has gone on.
     pub fn into_owned(self) -> EngineState<'static> {
-        let Self { step, present, previous, roles, leaders, guided, breaks, activity, broken, after_all } =
-            self;
+        let Self {
+            step,
+            present,
+            previous,
+            roles,
+            taken_by,
+            leaders,
+            guided,
+            breaks,
+            activity,
+            broken,
+            after_all,
+        } = self;
         EngineState {
             step,
             present: Cow::Owned(present.into_owned()),
             previous: Cow::Owned(previous.into_owned()),
             roles: Cow::Owned(roles.into_owned()),
+            taken_by: Cow::Owned(taken_by.into_owned()),
             leaders,
             guided: Cow::Owned(guided.into_owned()),
             breaks: Cow::Owned(breaks.into_owned()),
@@ -132,6 +150,8 @@ impl<'a> EngineState<'a> {
         // Those that are there for the others to have neighbours are never looked at.
         let (mut present, mut roles) = (Vectors::clone(&body.reference), setup.roles.clone());
         let (mut previous, mut leaders, mut known) = (present.clone(), Vec::new(), 0);
+        let has_taken = pieces.iter().any(|(_, state)| !state.taken_by.is_empty());
+        let mut taken_by = vec![0; if has_taken { body.count() } else { 0 }];
         for (begin, state) in pieces {
             let regular = state.count().saturating_sub(state.after_all.len());
             let index = |i: usize| if i < regular { begin + i } else { state.after_all[i - regular] };
@@ -140,6 +160,9 @@ impl<'a> EngineState<'a> {
                 present.set(to, state.present.get(i));
                 previous.set(to, state.previous.get(i));
                 roles[to] = state.roles[i];
+                if let (Some(to), Some(&last)) = (taken_by.get_mut(to), state.taken_by.get(i)) {
+                    *to = last;
+                }
                 known += 1;
             }
             leaders.extend(state.leaders.iter().filter_map(|led| {
@@ -160,6 +183,7 @@ impl<'a> EngineState<'a> {
             present: Cow::Owned(present),
             previous: Cow::Owned(previous),
             roles: Cow::Owned(roles),
+            taken_by: Cow::Owned(taken_by),
             leaders,
             guided: Cow::Owned(Vec::new()),
             broken: setup
@@ -187,6 +211,7 @@ impl<'a> EngineState<'a> {
         engine.present = self.present.into_owned();
         engine.previous = self.previous.into_owned();
         engine.roles = self.roles.into_owned();
+        engine.taken_by = self.taken_by.into_owned();
         engine.leaders = self.leaders;
         engine.led = engine.leaders.iter().map(|led| led.particle).collect();
         engine.guided = self.guided.into_owned();
@@ -207,6 +232,7 @@ impl<'a> EngineState<'a> {
         require("particles", self.present.len(), count)?;
         require("former places", self.previous.len(), count)?;
         require("roles", self.roles.len(), count)?;
+        require("particles that changes took", self.taken_by.len(), engine.taken_by.len())?;
         let bits = engine.flock.bonds.as_ref().map(|_| engine.flock.neighbours.index.len().div_ceil(8));
         require("bytes of bonds", self.broken.as_ref().map_or(0, Vec::len), bits.unwrap_or(0))?;
         // A number from a file is an index only when it is below what it counts.

@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::error::{ExportError, write_file};
 use super::{OutputFolder, bonds, largest_strain};
 use crate::continuum::cuts;
+use crate::continuum::doubts;
 use crate::continuum::late;
 use crate::continuum::layout::regions::uneven_sides;
 use crate::continuum::mechanics::{Mechanics, Peak, Stresses, percent};
@@ -294,6 +295,7 @@ fn cautions(scene: &Scene, engine: &Engine, measured: Option<&Measured>) -> Vec<
     uneven_sides(scene)
         .into_iter()
         .chain(late::cautions(scene))
+        .chain(doubts::seen(scene, engine))
         .chain(cuts::made(scene, engine))
         .chain(measured.map(of_forces).into_iter().flatten())
         .collect()

@@ -227,6 +227,8 @@ impl Neighbours {
         members: &[bool],
         radius: f64,
     ) {
+        // As `Lattice::offsets_within` takes those that are off by rounding.
+        let radius = radius * (1.0 + 1e-9);
         grid.fill(present, members, radius);
         grid.all_within(members.len(), radius, &mut self.starts, &mut self.index);
     }

@@ -50,8 +50,9 @@ pub enum Side {
 }
 
 impl Region {
-    /// Indices of the particles of `body` in the region, ascending.
-    pub fn pick(&self, body: &Body, neighbours: &Neighbours) -> Vec<usize> {
+    /// Indices of the particles of `body` in the region, ascending. `complete` says how many neighbours a particle inside a
+    /// body has, by sublattice; where it is empty, the particle with the most has them all.
+    pub fn pick(&self, body: &Body, neighbours: &Neighbours, complete: &[usize]) -> Vec<usize> {
         let tolerance = 1e-9 * body.lattice.spacing();
         let matter = body.body_particles();
         let place = |i: usize| body.reference.get(i);
@@ -84,10 +85,13 @@ impl Region {
             }
             Region::Boundary => {
                 let most = || matter.clone().map(|i| neighbours.of(i).len()).max().unwrap_or(0);
-                let complete = body.part.as_ref().map_or_else(most, |part| part.whole.neighbours);
+                let most = || body.part.as_ref().map_or_else(most, |part| part.whole.neighbours);
+                let most = complete.is_empty().then(most);
+                let of_site = |i: usize| complete[body.lattice.sublattice(body.sites[i])];
+                let complete = |i: usize| most.unwrap_or_else(|| of_site(i));
                 let lacks = |i: usize| {
                     let seen = neighbours.of(i);
-                    seen.len() < complete || seen.iter().any(|&k| body.is_frame[k as usize])
+                    seen.len() < complete(i) || seen.iter().any(|&k| body.is_frame[k as usize])
                 };
                 matter.filter(|&i| lacks(i)).collect()
             }

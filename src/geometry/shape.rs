@@ -147,20 +147,29 @@ pub(crate) fn segment_distance(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
     (p[0] - a[0] - along * dx).hypot(p[1] - a[1] - along * dy)
 }
 
+/// How far apart segments touch, over the largest coordinate or distance: some thousand times what rounding makes.
+const TOUCHES: f64 = 1e-13;
+
 /// Whether the segments `a`-`b` and `c`-`d` cross or touch.
 pub(crate) fn segments_cross(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2]) -> bool {
     let apart = |p: [f64; 2], q: [f64; 2]| [q[0] - p[0], q[1] - p[1]];
     // In units of the largest distance, and by sign: their products would be fourth powers of lengths.
-    let unit = [b, c, d].iter().flat_map(|&end| apart(a, end)).fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()));
+    let largest = |of: &[[f64; 2]]| of.iter().flatten().fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()));
+    let unit = largest(&[b, c, d].map(|end| apart(a, end)));
+    // What differs by rounding touches: in any unit, and wherever the axes are.
+    let rounding = TOUCHES * largest(&[a, b, c, d]).max(unit);
     let side = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| {
         let ([x, y], [u, v]) = (apart(p, q).map(|v| v / unit), apart(p, r).map(|v| v / unit));
         let twice_area = x * v - y * u;
-        if twice_area == 0.0 { 0.0 } else { twice_area.signum() }
+        let size = [x, y, u, v].iter().fold(0.0, |most: f64, part| most.max(part.abs()));
+        if twice_area.abs() <= rounding / unit * size { 0.0 } else { twice_area.signum() }
     };
     let (abc, abd, cda, cdb) = (side(a, b, c), side(a, b, d), side(c, d, a), side(c, d, b));
     if abc == 0.0 && abd == 0.0 {
         // On one line: they meet where their projections overlap.
-        return (0..2).all(|k| a[k].min(b[k]) <= c[k].max(d[k]) && c[k].min(d[k]) <= a[k].max(b[k]));
+        let reaches = |low: f64, high: f64| low <= high + rounding;
+        return (0..2)
+            .all(|k| reaches(a[k].min(b[k]), c[k].max(d[k])) && reaches(c[k].min(d[k]), a[k].max(b[k])));
     }
     abc * abd <= 0.0 && cda * cdb <= 0.0
 }
@@ -211,5 +220,15 @@ mod tests {
         assert!(!segments_cross([0.0, 0.0], [2.0, 0.0], [0.0, 1.0], [2.0, 1.0]));
         assert!(segments_cross([0.0, 0.0], [2.0, 0.0], [1.0, 0.0], [3.0, 0.0]));
         assert!(!segments_cross([0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]));
+        // A row of particles along a cut, with spacings that are no doubles.
+        for unit in [1.0, 0.1, 0.3, 0.07] {
+            let [y, low, high] = [3.0, 2.0, 4.0].map(|row| unit * row);
+            let cut = ([2.5 * unit, 3.0 * unit], [8.5 * unit, 0.1 * (30.0 * unit)]);
+            let is_cut = |a: [f64; 2], b: [f64; 2]| segments_cross(a, b, cut.0, cut.1);
+            for x in [3.0, 5.0, 8.0].map(|column| unit * column) {
+                assert!(is_cut([x, y], [x, low]) && is_cut([x, y], [x, high]), "{unit} {x}");
+                assert!(is_cut([x, y], [x + unit, y]) && !is_cut([x, low], [x + unit, low]), "{unit} {x}");
+            }
+        }
     }
 }

@@ -78,7 +78,7 @@ pub struct Scene {
     pub inclusions: Vec<Inclusion>,
     /// Loads on the body, in the order of the file.
     pub loads: Vec<Load>,
-    /// Roles in the order in which they are written; later entries win.
+    /// Roles in the order in which they are written; of those of one step the later one wins.
     pub roles: Vec<RoleEntry>,
     /// When bonds break and what stands in for them; none where the scene does not say.
     pub fracture: Option<Fracture>,

@@ -8,9 +8,17 @@ use crate::flock::vectors::distance;
 #[derive(Clone, Debug, PartialEq)]
 pub enum DisplacementTable {
     /// `x,y,ux,uy`: by reference position \[length\].
-    ByPlace(Vec<([f64; 2], [f64; 2])>),
+    ByPlace(Vec<([f64; 2], Displaced)>),
     /// `id,ux,uy`: by id, counted from 1.
-    ById(Vec<(usize, [f64; 2])>),
+    ById(Vec<(usize, Displaced)>),
+}
+
+/// What a row says of its particle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Displaced {
+    line: u64,
+    /// \[length\]
+    by: [f64; 2],
 }
 
 impl DisplacementTable {
@@ -32,11 +40,14 @@ impl DisplacementTable {
         };
         let (mut places, mut ids) = (Vec::new(), Vec::new());
         rows.each(|row| {
+            let displaced = |column: usize| -> Result<Displaced, String> {
+                let by = [row.number(column, scale)?, row.number(column + 1, scale)?];
+                Ok(Displaced { line: row.line, by })
+            };
             if by_id {
-                ids.push((row.id(0)? as usize, [row.number(1, scale)?, row.number(2, scale)?]));
+                ids.push((row.id(0)? as usize, displaced(1)?));
             } else {
-                let place = [row.number(0, 1.0)?, row.number(1, 1.0)?];
-                places.push((place, [row.number(2, scale)?, row.number(3, scale)?]));
+                places.push(([row.number(0, 1.0)?, row.number(1, 1.0)?], displaced(2)?));
             }
             Ok(())
         })?;
@@ -46,20 +57,27 @@ impl DisplacementTable {
     /// Displacement of each of `particles` (indices), in their order.
     ///
     /// # Errors
-    /// A sentence that names the first particle without a row.
+    /// A sentence that names the first particle without a row, or with two that differ.
     pub fn of(&self, particles: &[usize], body: &Body) -> Result<Vec<[f64; 2]>, String> {
         let near = 1e-6 * body.lattice.spacing();
         particles
             .iter()
             .map(|&i| {
                 let (place, id) = (body.reference.get(i), body.id(i));
-                let row = match self {
-                    Self::ById(rows) => rows.iter().find(|row| row.0 == id).map(|row| row.1),
-                    Self::ByPlace(rows) => {
-                        rows.iter().find(|(at, _)| distance(*at, place) <= near).map(|row| row.1)
-                    }
+                let is_at = |at: [f64; 2]| distance(at, place) <= near;
+                let rows: Vec<Displaced> = match self {
+                    Self::ById(rows) => rows.iter().filter(|row| row.0 == id).map(|row| row.1).collect(),
+                    Self::ByPlace(rows) => rows.iter().filter(|row| is_at(row.0)).map(|row| row.1).collect(),
                 };
-                row.ok_or_else(|| format!("no row for particle {id} at ({}, {})", place[0], place[1]))
+                let particle = || format!("particle {id} at ({}, {})", place[0], place[1]);
+                let first = rows.first().ok_or_else(|| format!("no row for {}", particle()))?;
+                match rows.iter().find(|row| row.by != first.by) {
+                    Some(other) => {
+                        let [line, other] = [first.line, other.line];
+                        Err(format!("lines {line} and {other}: both are of {}, and differ", particle()))
+                    }
+                    None => Ok(first.by),
+                }
             })
             .collect()
     }
@@ -77,6 +95,16 @@ mod tests {
         let by_id = DisplacementTable::parse("id,ux,uy\n2,3,4\n", 1.0).expect("reads");
         assert_eq!(by_id.of(&[1], &body), Ok(vec![[3.0, 4.0]]));
         assert_eq!(by_id.of(&[0], &body), Err("no row for particle 1 at (10, 10)".into()));
+    }
+
+    #[test]
+    fn two_rows_of_a_particle_that_differ_are_refused() {
+        let body = Body::of_places([[10.0, 10.0], [11.0, 10.0]].into_iter().collect(), 1.0);
+        let of = |text: &str| DisplacementTable::parse(text, 1.0).expect("reads").of(&[0], &body);
+        let differ = Err("lines 2 and 4: both are of particle 1 at (10, 10), and differ".into());
+        assert_eq!(of("id,ux,uy\n1,3,4\n2,0,0\n1,3,5\n"), differ);
+        assert_eq!(of("x,y,ux,uy\n10,10,3,4\n11,10,0,0\n10,10,0,0\n"), differ);
+        assert_eq!(of("id,ux,uy\n1,3,4\n1,3,4\n"), Ok(vec![[3.0, 4.0]]));
     }
 
     #[test]

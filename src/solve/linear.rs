@@ -206,7 +206,7 @@ impl Linear<'_> {
 }
 
 /// Factor by which feedback stretches displacements from the initial position.
-fn overshoot(rule: &Rule) -> f64 {
+pub(crate) fn overshoot(rule: &Rule) -> f64 {
     match rule.feedback {
         Some(Feedback { factor, reference: FeedbackReference::Initial }) => 1.0 + factor,
         _ => 1.0,

@@ -358,6 +358,8 @@ fn regions_roles_and_probes_that_miss_the_body_are_refused() {
         &["has no motion of its own"],
     );
     refused_with("tension", &["roles[2].when={quantity=\"pe1\"}"], &["no bound", "above"]);
+    let never = "roles[2].when={quantity=\"x\",above=4,below=4}";
+    refused_with("tension", &[never], &["roles[2].when.above", "above 4 and below 4", "lower bound"]);
 }
 
 #[test]
@@ -368,6 +370,8 @@ fn rules_that_contradict_themselves_are_refused() {
     refused_with("tension", &["rule.weights={kind=\"list\",values=[1,1,-1,-1]}"], &["add up to 0"]);
     let huge = "rule.weights={kind=\"list\",values=[1e308,1e308,1e308,1e308]}";
     refused_with("tension", &[huge], &["too large", "smaller"]);
+    let steep = ["rule.weights={kind=\"distance\",power=3000}", "neighbours={kind=\"chebyshev\",radius=1}"];
+    refused_with("tension", &steep, &["rule.weights.power", "add up to inf", "nearer to 0"]);
     let own = "neighbours={kind=\"offsets\",offsets=[[1,0],[0,0]]}";
     refused_with("tension", &[own], &["neighbours.offsets[1]", "not its own neighbour"]);
     refused_with("tension", &["unit=\"\""], &["unit", "at least 1 character"]);
@@ -380,6 +384,27 @@ fn rules_that_contradict_themselves_are_refused() {
         &["roles[1].motion.frames=[{step=9,displacement=[1,0]},{step=3,displacement=[2,0]}]"],
         &["ascending"],
     );
+}
+
+#[test]
+fn feedback_that_leaves_no_place_of_rest_is_named() {
+    let roles = "roles=[{region={kind='edge',side='left'},role='clamped'},{region={kind='edge',side='right'},\
+                 role='leader',motion={kind='velocity',per_step=[0.1,0]}}]";
+    for factor in ["-1", "0.8", "-2.5"] {
+        let factor = format!("rule.feedback={{factor={factor}}}");
+        let keys = [roles, &factor, "frame=none", "record={}", "equilibrium={}"];
+        refused_with("tension", &keys, &["rule.feedback.factor", "stretches", "between -1 and 0"]);
+    }
+}
+
+#[test]
+fn a_quiet_run_that_diverges_says_why() {
+    let folder = temporary();
+    let grown = ["--set", "rule.feedback={factor=0.8}", "--figures", "none", "--no-report"];
+    let output = flockform(&[&["run", "tension", "-q"], &grown[..]].concat(), folder.path());
+    assert_eq!((output.status.code(), text(&output.stdout)), (Some(1), String::new()));
+    let said = text(&output.stderr);
+    assert!(said.starts_with("error: tension: diverged at step") && said.contains("feedback"), "{said}");
 }
 
 #[test]

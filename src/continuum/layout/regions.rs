@@ -134,13 +134,14 @@ impl Layout {
         let mut particles = match (region, &self.outline) {
             (SceneRegion::Outline(selection), Some(outline)) => {
                 check_pieces(scene, &key, region, outline)?;
-                self.pick_along(selection, outline)
+                self.pick_along(scene, selection, outline)
             }
             (SceneRegion::Outline(_), None) => {
                 let message = "the body has no outline of its own";
                 return Err(scene.refuse(&key, message, "pick the particles by place or by id"));
             }
-            (SceneRegion::Known(region), _) => region.pick(&self.body, &self.neighbours),
+            (SceneRegion::Known(Region::Boundary), _) => self.along_boundary(scene),
+            (SceneRegion::Known(region), _) => region.pick(&self.body, &self.neighbours, &[]),
             (SceneRegion::Outermost(side), _) => self.outermost(*side),
         };
         let exact = self.body.exact();
@@ -152,16 +153,25 @@ impl Layout {
         Ok(particles)
     }
 
+    fn along_boundary(&self, scene: &Scene) -> Vec<usize> {
+        let offsets = scene.neighbourhood.offsets(&scene.lattice).unwrap_or_default();
+        // Points have no sites that could be complete.
+        let complete = if scene.is_of_points() { Vec::new() } else { offsets.iter().map(Vec::len).collect() };
+        Region::Boundary.pick(&self.body, &self.neighbours, &complete)
+    }
+
     /// The particles on parts of the outline, or, of a body of whole cells, nearest to them, ascending.
-    fn pick_along(&self, selection: &Selection, outline: &Outline) -> Vec<usize> {
+    fn pick_along(&self, scene: &Scene, selection: &Selection, outline: &Outline) -> Vec<usize> {
         let near = 1e-6 * self.body.lattice.spacing();
         let portions = outline.portions(selection, 0.0);
         let candidates: Vec<(usize, Place)> = match &self.body.outline {
             Some(known) => (0..self.body.count()).filter_map(|i| Some((i, known.places[i]?))).collect(),
             None => {
-                let boundary = Region::Boundary.pick(&self.body, &self.neighbours).into_iter();
                 let finder = Finder::new(outline);
-                boundary.map(|i| (i, finder.nearest(self.body.reference.get(i)).0)).collect()
+                self.along_boundary(scene)
+                    .into_iter()
+                    .map(|i| (i, finder.nearest(self.body.reference.get(i)).0))
+                    .collect()
             }
         };
         let is_on = |place: &Place| {
@@ -194,7 +204,7 @@ impl Layout {
     /// The particles at the outermost coordinate on a side; of a body that has no flat side there, those half a spacing
     /// deep, or of whole cells as deep as a row.
     fn outermost(&self, side: Side) -> Vec<usize> {
-        let within = |depth: f64| Region::Edge { side, depth }.pick(&self.body, &self.neighbours);
+        let within = |depth: f64| Region::Edge { side, depth }.pick(&self.body, &self.neighbours, &[]);
         if self.body.outline.is_some() {
             let flat = within(FLAT * self.body.lattice.spacing());
             if self.flat.map_or(flat.len() > 1, |flat| flat[side as usize]) {

@@ -11,6 +11,8 @@ use super::Neighbour;
 /// Median of each coordinate; `None` without neighbours or without a positive sum of weights.
 pub fn mean(neighbours: impl Iterator<Item = Neighbour> + Clone) -> Option<[f64; 2]> {
     let total: f64 = neighbours.clone().map(|n| n.weight).sum();
+    // What has half of the weight but for rounding has half of it.
+    let half = total * (1.0 - 1e-12);
     let axis = |k: usize| {
         let values = || neighbours.clone().map(|n| n.position[k]);
         let weight = |counts: &dyn Fn(f64) -> bool| {
@@ -18,10 +20,9 @@ pub fn mean(neighbours: impl Iterator<Item = Neighbour> + Clone) -> Option<[f64;
         };
         // Neighbours are few: counting for each of them needs no memory.
         let low =
-            values().filter(|&v| 2.0 * weight(&|other| other <= v) >= total).fold(f64::INFINITY, f64::min);
-        let high = values()
-            .filter(|&v| 2.0 * weight(&|other| other >= v) >= total)
-            .fold(f64::NEG_INFINITY, f64::max);
+            values().filter(|&v| 2.0 * weight(&|other| other <= v) >= half).fold(f64::INFINITY, f64::min);
+        let high =
+            values().filter(|&v| 2.0 * weight(&|other| other >= v) >= half).fold(f64::NEG_INFINITY, f64::max);
         0.5 * low + 0.5 * high
     };
     (total > 0.0).then(|| [axis(0), axis(1)])
@@ -61,6 +62,17 @@ mod tests {
         assert_eq!(weighted([2.0, 1.0, 1.0]), Some([1.5, -1.5]));
         assert_eq!(weighted([0.0, 1.0, 0.0]), Some([2.0, -2.0]));
         assert_eq!(weighted([0.0; 3]), None);
+    }
+
+    #[test]
+    fn rounding_decides_no_tie_of_weights() {
+        let weighted = |unit: f64| {
+            let all = [(1.0, 1.0), (2.0, 2.0), (3.0, 3.0), (4.0, 6.0)].into_iter();
+            mean(all.map(move |(x, weight)| Neighbour { weight: unit * weight, ..Neighbour::at([x, x]) }))
+        };
+        for unit in [1.0, 0.1, 0.3, 0.7] {
+            assert_eq!(weighted(unit), Some([3.5, 3.5]), "{unit}");
+        }
     }
 
     #[test]

@@ -153,9 +153,30 @@ impl Rule {
         own: &ParticleState,
         neighbours: impl Iterator<Item = Neighbour> + Clone,
     ) -> [f64; 2] {
+        if let Mean::Power { exponent, origin } = self.mean {
+            return self.target_by_axes(*own, power::mean(exponent, origin, neighbours));
+        }
         match self.mean(own.present, neighbours) {
             Some(mean) => self.completed(own, mean),
             None => own.present,
+        }
+    }
+
+    /// A coordinate without a mean stays.
+    fn target_by_axes(&self, mut own: ParticleState, means: [Option<f64>; 2]) -> [f64; 2] {
+        let mean = [0, 1].map(|k| means[k].unwrap_or(own.present[k]));
+        own.rest = [0, 1].map(|k| if means[k].is_some() { own.rest[k] } else { 0.0 });
+        let target = self.completed(&own, mean);
+        [0, 1].map(|k| if means[k].is_some() { target[k] } else { own.present[k] })
+    }
+
+    /// The coordinates of which these neighbours have no mean.
+    pub(crate) fn lacks_mean(&self, neighbours: impl Iterator<Item = Neighbour> + Clone) -> [bool; 2] {
+        match self.mean {
+            Mean::Power { exponent, origin } => {
+                power::mean(exponent, origin, neighbours).map(|mean| mean.is_none())
+            }
+            _ => [false; 2],
         }
     }
 
@@ -221,7 +242,10 @@ impl Rule {
         match self.mean {
             Mean::Barycentre => barycentre::mean(neighbours),
             Mean::Distance { power } => distance::mean(power, present, neighbours),
-            Mean::Power { exponent, origin } => power::mean(exponent, origin, neighbours),
+            Mean::Power { exponent, origin } => {
+                let means = power::mean(exponent, origin, neighbours);
+                (means != [None; 2]).then(|| [0, 1].map(|k| means[k].unwrap_or(present[k])))
+            }
             Mean::Median => median::mean(neighbours),
             Mean::Spaced { spacing, power } => spaced::mean(spacing, power, present, neighbours),
             Mean::Material { .. } => material::mean(neighbours.map(|n| (n.matrix, n.position))),

@@ -32,6 +32,9 @@ pub struct Poisson {
     pub exponent: f64,
 }
 
+/// How near the axis a particle is on it, over the half width or the distance of the axis from zero, whichever is more.
+const ON_AXIS: f64 = 1e-12;
+
 impl Poisson {
     /// Distance function `da` \[1\] at a reference position \[length\].
     pub(crate) fn distance_from_axis(&self, reference: [f64; 2]) -> f64 {
@@ -40,7 +43,12 @@ impl Poisson {
             Axis::Y => reference[0],
         };
         let s = (across - self.centre) / self.half_width;
-        if s == 0.0 { 0.0 } else { s.signum() * s.abs().powf(self.exponent) }
+        // On the axis but for rounding, which a small exponent would blow up.
+        let rounding = ON_AXIS * f64::max(1.0, (self.centre / self.half_width).abs());
+        if s == 0.0 || self.exponent < 1.0 && s.abs() <= rounding {
+            return 0.0;
+        }
+        s.signum() * s.abs().powf(self.exponent)
     }
 
     /// Adds the term to a target whose coordinate along `axis` is the new one already.
@@ -70,5 +78,14 @@ mod tests {
         assert!((moved(4.0) + 0.1).abs() < 1e-15);
         assert!((moved(0.0) - 0.1).abs() < 1e-15);
         assert_eq!(moved(2.0), 0.0);
+    }
+
+    #[test]
+    fn rounding_puts_no_particle_off_the_axis() {
+        let on = |centre: f64, exponent: f64| {
+            Poisson { k: 1.0, axis: Axis::X, centre, half_width: 0.2, exponent }
+                .distance_from_axis([0.0, 0.1 + 0.2])
+        };
+        assert_eq!([on(0.3, 0.0), on(0.3, 0.5), on(0.2, 0.0), on(0.4, 0.0)], [0.0, 0.0, 1.0, -1.0]);
     }
 }

@@ -66,7 +66,9 @@ pub struct RawScene {
     /// How targets become positions.
     #[serde(default)]
     pub update: RawUpdate,
-    /// Roles of the particles, and from when; later entries win. Particles that no entry names are followers.
+    /// Roles of the particles, and from when. Each entry takes its particles at its step, whatever has taken them before; at the
+    /// same step the later entry wins, and one with a condition takes none that a later entry has taken before. Particles
+    /// that no entry names are followers.
     #[serde(default)]
     pub roles: Vec<RawRoles>,
     /// Bonds break where this is given.

@@ -21,7 +21,8 @@ pub struct RawRoles {
     /// First step at which the role holds [step]; 0 and 1 both mean from the start.
     #[serde(default)]
     pub from: usize,
-    /// The role is taken, particle by particle, when this first holds (from step `from` on).
+    /// The role is taken, particle by particle, when this first holds (from step `from` on): once, and by no particle
+    /// that a later entry has taken before. A run with `stop.tolerance` goes on until `from`, and no longer.
     #[serde(default)]
     pub when: Option<RawWhen>,
     /// How leaders move; only they do.
@@ -146,7 +147,7 @@ pub enum RawQuantity {
     Pe2,
 }
 
-/// How leaders move; steps are counted from when they became leaders.
+/// How leaders move; steps are counted from when they became leaders, displacements from where they stood then.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum RawMotion {
@@ -184,7 +185,8 @@ pub enum RawMotion {
     },
     /// To and fro.
     Sinusoid {
-        /// Largest displacement [length].
+        /// Largest displacement from the middle of the motion. With a phase the motion begins away from the middle, and gets
+        /// up to twice as far from there [length].
         amplitude: [f64; 2],
         /// Time of one oscillation [step].
         #[schemars(extend("exclusiveMinimum" = 0))]
@@ -223,7 +225,7 @@ pub struct RawKeyframe {
     /// When it is there [step].
     #[schemars(range(min = 1))]
     pub step: usize,
-    /// From its place in the body [length].
+    /// From where it stood when it became a leader, which is its place in the body for leaders from the start [length].
     pub displacement: [f64; 2],
 }
 

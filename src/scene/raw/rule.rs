@@ -131,8 +131,8 @@ pub enum RawOrigin {
     /// One spacing below the lowest neighbour: invariant under translation.
     #[default]
     Moving,
-    /// The axes' zero: the literal formula, which depends on where the body is and needs positive
-    /// coordinates.
+    /// The axes' zero: the literal formula, which depends on where the body is. A particle does not move along an axis on
+    /// which a neighbour has a negative coordinate.
     World,
 }
 
@@ -249,6 +249,6 @@ pub enum RawOrder {
     /// All particles use the old positions (the paper).
     #[default]
     Synchronous,
-    /// Each uses the new positions of the particles numbered before it.
+    /// Each uses the new positions of the particles numbered before it, and of all leaders, which move first.
     Sequential,
 }

@@ -109,6 +109,13 @@ fn condition(key: &str, raw: &RawWhen, refuse: Refuse<'_>) -> Result<Condition, 
         let message = "the condition has no bound".into();
         return Err(refuse(&format!("{key}.when"), message, "add `above = VALUE`, `below = VALUE` or both"));
     }
+    if let (Some(above), Some(below)) = (raw.above, raw.below)
+        && above >= below
+    {
+        let message = format!("nothing is above {above} and below {below}: the role would never be taken");
+        let help = "give the lower bound as above, or two entries, one for each bound";
+        return Err(refuse(&format!("{key}.when.above"), message, help));
+    }
     let quantity = match raw.quantity {
         RawQuantity::X => Quantity::X,
         RawQuantity::Y => Quantity::Y,

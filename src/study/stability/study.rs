@@ -24,7 +24,7 @@ pub struct Threshold {
     pub found: Option<Found>,
     /// How far apart the two may be: a thousandth of what the sweep is from growing, or from not growing,
     /// at the parameter's neutral value (no feedback, no damping), and 1e-6 at least; where runs do not settle
-    /// 4 over the number of their steps, which is what they can resolve \[1\].
+    /// 4 over the number of their steps, which is what they can resolve; of values above 1, so much of them \[1\].
     pub tolerance: f64,
 }
 
@@ -164,7 +164,8 @@ fn threshold(
     let tolerance = if settled { tolerance } else { tolerance.max(4.0 / steps as f64) };
     let predicted =
         predict(subject, parameter, side, &mut |value| progress(&format!("{what}: the spectrum at {value}")));
-    Threshold { parameter, side, predicted, found, tolerance }
+    let size = predicted.as_ref().map_or(1.0, |predicted| predicted.value.abs().max(1.0));
+    Threshold { parameter, side, predicted, found, tolerance: tolerance * size }
 }
 
 /// Runs and spectra from one threshold to the other and a little beyond.

@@ -1,0 +1,86 @@
+//! Means and thresholds that do not suit the body.
+
+use crate::engine::Engine;
+use crate::engine::setup::Setup;
+use crate::flock::body::Body;
+use crate::flock::fracture::Threshold;
+use crate::flock::law::Flock;
+use crate::flock::role::Role;
+use crate::flock::vectors::{Vectors, distance};
+use crate::scene::Scene;
+
+/// Counts of a body, or of a part of one.
+struct Doubts {
+    followers: usize,
+    /// Those of which a neighbour has a coordinate that the mean does not take.
+    unmoved: usize,
+    /// Bonds between particles of the body that are as long as the fracture distance before anything moves.
+    long: usize,
+}
+
+impl Doubts {
+    fn of(body: &Body, flock: &Flock, roles: &[Role], places: &Vectors) -> Self {
+        let follows = |&i: &usize| roles[i] == Role::Follower && !flock.neighbours.of(i).is_empty();
+        let followers: Vec<usize> = body.owned().filter(follows).collect();
+        let lacks = |&&i: &&usize| flock.lacks_mean(i, places).contains(&true);
+        let least = match flock.bonds.as_ref().and_then(|bonds| bonds.threshold) {
+            // Rounding decides whether one that is exactly as long breaks.
+            Some(Threshold::Distance(distance)) => distance * (1.0 - 1e-9),
+            _ => f64::INFINITY,
+        };
+        let length = |i: usize, k: usize| distance(body.reference.get(i), body.reference.get(k));
+        let is_long =
+            |i: usize, k: usize| !body.is_frame[k] && length(i, k) >= least && (i < k || !sees(flock, k, i));
+        let long = |i: usize| flock.neighbours.of(i).iter().filter(|&&k| is_long(i, k as usize)).count();
+        Self {
+            followers: followers.len(),
+            unmoved: followers.iter().filter(lacks).count(),
+            long: if least.is_finite() {
+                body.owned().filter(|&i| !body.is_frame[i]).map(long).sum()
+            } else {
+                0
+            },
+        }
+    }
+
+    fn cautions(&self, scene: &Scene) -> Vec<String> {
+        let Self { followers, unmoved, long } = *self;
+        let unmoved = (unmoved > 0).then(|| {
+            format!(
+                "{unmoved} of {followers} followers have a neighbour at a negative coordinate, of which there is no mean \
+                 about the axes' zero: along that axis they do not move; move the body by body.anchor, or use \
+                 rule.mean.origin = \"moving\""
+            )
+        });
+        let long = scene.raw.fracture.as_ref().and_then(|fracture| fracture.distance).filter(|_| long > 0);
+        let long = long.map(|df| {
+            format!(
+                "fracture.distance = {df} is no more than the length of {} bonds of the undeformed body, which break at \
+                 once; raise it above the longest",
+                self.long
+            )
+        });
+        unmoved.into_iter().chain(long).collect()
+    }
+}
+
+fn sees(flock: &Flock, from: usize, other: usize) -> bool {
+    flock.neighbours.of(from).contains(&(other as u32))
+}
+
+/// The warnings before a run.
+pub(crate) fn planned(scene: &Scene, Setup { body, flock, roles, .. }: &Setup) -> Vec<String> {
+    // A part does not see the others.
+    if body.part.is_some() {
+        return Vec::new();
+    }
+    Doubts::of(body, flock, roles, &body.reference).cautions(scene)
+}
+
+/// The warnings after a run, made by all ranks together where each has a part of the body.
+pub(crate) fn seen(scene: &Scene, engine: &Engine) -> Vec<String> {
+    let Doubts { followers, unmoved, long } =
+        Doubts::of(engine.body(), engine.flock(), engine.roles(), engine.present());
+    let [followers, unmoved, long] = [followers, unmoved, long].map(|own| engine.count_of_parts(own));
+    Doubts { followers, unmoved, long }.cautions(scene)
+}
