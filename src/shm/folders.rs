@@ -5,8 +5,11 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use iceoryx2::prelude::Config;
+
+use super::ShmError;
 
 /// Removes them when it is dropped, which must be after all that has files in them.
 #[derive(Debug)]
@@ -16,10 +19,16 @@ pub(super) struct Folders {
     /// Of all files of the domain, and of the one in which it counts its nodes.
     prefix: String,
     counter: String,
+    /// Of the files that describe services.
+    service: String,
 }
 
 /// Where the system keeps shared memory as files.
 const SHARED_MEMORY: &str = "/dev/shm";
+
+/// Time after which a file that is still being made is one that its maker left: iceoryx2 makes one in milliseconds, and
+/// gives up waiting for most after a second.
+const MAKING: Duration = Duration::from_secs(2);
 
 impl Folders {
     pub fn of(config: &Config) -> Self {
@@ -27,7 +36,8 @@ impl Folders {
         let folders =
             [*global.root_path(), global.service_dir(), global.node_dir()].map(|path| as_path(&path));
         let (prefix, counter) = (global.prefix.to_string(), global.node.global_mgmt_suffix.to_string());
-        Self { folders, prefix, counter }
+        let service = global.service.static_config_storage_suffix.to_string();
+        Self { folders, prefix, counter, service }
     }
 
     /// Makes those that are missing, and opens this user's to all.
@@ -38,6 +48,115 @@ impl Folders {
             let _ = open_to_all(folder);
         }
     }
+
+    /// Waits for files of the domain that are being made, and removes those that a process left which died while it made
+    /// them: iceoryx2 would refuse them for good, or wait for them without end. Their maker may live where any peer does.
+    ///
+    /// # Errors
+    /// Names the files that stay.
+    pub fn clear_unfinished(&self, has_peers: impl FnOnce() -> bool) -> Result<(), ShmError> {
+        let begun = Instant::now();
+        let is_left = |file: &PathBuf| {
+            let modified = file.metadata().and_then(|found| found.modified());
+            // Of a clock that was set back none is old.
+            modified.is_ok_and(|time| time.elapsed().is_ok_and(|age| age >= MAKING))
+        };
+        let mut files = self.unfinished();
+        while !files.iter().all(is_left) && begun.elapsed() < 2 * MAKING {
+            std::thread::sleep(Duration::from_millis(10));
+            files = self.unfinished();
+        }
+        if files.is_empty() {
+            return Ok(());
+        }
+        if !has_peers() {
+            files.retain(|file| {
+                is_left(file) && is_unfinished(file, &self.service) && fs::remove_file(file).is_err()
+            });
+            files.retain(|file| file.exists());
+        }
+        if files.is_empty() { Ok(()) } else { Err(ShmError::Unfinished { files }) }
+    }
+
+    /// Removes the files of a domain in which no process lives; what a dead one has made in part, iceoryx2 would wait for.
+    /// Processes register before they make any, but for the counter.
+    pub fn clear_remains(&self, has_peers: impl FnOnce() -> bool) {
+        let made = |file: &PathBuf| file.metadata().and_then(|found| found.modified()).ok();
+        let is_counter =
+            |file: &PathBuf| file.file_name().is_some_and(|name| self.is_counter(&name.to_string_lossy()));
+        let files = self.files().into_iter().filter(|file| !is_counter(file));
+        let files: Vec<_> = files.map(|file| (made(&file), file)).collect();
+        if files.is_empty() || has_peers() {
+            return;
+        }
+        // Not one that another process has made anew meanwhile.
+        let remains = files.into_iter().filter(|(then, file)| made(file) == *then);
+        remains.for_each(|(_, file)| drop(fs::remove_file(file)));
+    }
+
+    /// Files of the domain in shared memory and among the services.
+    fn files(&self) -> Vec<PathBuf> {
+        let [_, services, _] = &self.folders;
+        let of_domain = |folder: &Path| {
+            let names = names(folder).into_iter().filter(|name| name.starts_with(&self.prefix));
+            names.map(|name| folder.join(name)).collect::<Vec<_>>()
+        };
+        let mut files = of_domain(Path::new(SHARED_MEMORY));
+        files.extend(of_domain(services).into_iter().filter(|file| has_ending(file, &self.service)));
+        files
+    }
+
+    fn unfinished(&self) -> Vec<PathBuf> {
+        self.files().into_iter().filter(|file| is_unfinished(file, &self.service)).collect()
+    }
+}
+
+fn has_ending(file: &Path, ending: &str) -> bool {
+    file.to_string_lossy().ends_with(ending)
+}
+
+/// Refuses shared memory with less room than `bytes`: what is written beyond it ends a process without a word.
+///
+/// # Errors
+/// Says how much there is.
+pub(super) fn require_room(bytes: u64) -> Result<(), ShmError> {
+    match room() {
+        Some(free) if free < bytes => Err(ShmError::Room { folder: SHARED_MEMORY, needed: bytes, free }),
+        _ => Ok(()),
+    }
+}
+
+/// Free shared memory \[bytes\], where the system says.
+#[cfg(target_os = "linux")]
+fn room() -> Option<u64> {
+    let folder = std::ffi::CString::new(SHARED_MEMORY).ok()?;
+    let mut found = std::mem::MaybeUninit::<libc::statvfs64>::uninit();
+    // SAFETY: the call reads a string and writes a struct, both of which live as long as it takes.
+    let is_known = unsafe { libc::statvfs64(folder.as_ptr(), found.as_mut_ptr()) } == 0;
+    // SAFETY: a call that went well has written the struct.
+    let found = is_known.then(|| unsafe { found.assume_init() })?;
+    Some(found.f_bavail.saturating_mul(found.f_frsize))
+}
+
+#[cfg(not(target_os = "linux"))]
+fn room() -> Option<u64> {
+    None
+}
+
+/// Whether a file is still being made: by its mode, which iceoryx2 sets at the end, or because nothing is in it.
+#[cfg(unix)]
+fn is_unfinished(file: &Path, service: &str) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let Ok(found) = file.metadata() else { return false };
+    match has_ending(file, service) {
+        true => found.mode() & 0o200 != 0,
+        false => found.len() == 0 || found.mode() & 0o400 == 0,
+    }
+}
+
+#[cfg(not(unix))]
+fn is_unfinished(_file: &Path, _service: &str) -> bool {
+    false
 }
 
 impl Drop for Folders {
