@@ -66,7 +66,7 @@ impl Domain {
         let name = NodeName::new(name).map_err(|error| refused(error.to_string()))?;
         let folders = Folders::of(&self.config);
         folders.open();
-        folders.clear_remains(|| has_peers(&self.config, None));
+        folders.clear_remains(|| has_peers(&self.config, None), || clean_up(&self.config, &folders));
         folders.clear_unfinished(|| has_peers(&self.config, None))?;
         let node = NodeBuilder::new()
             .name(&name)
@@ -78,6 +78,19 @@ impl Domain {
         folders.open();
         Ok(Peer { node, config: self.config.clone(), folders })
     }
+}
+
+/// Removes what dead nodes have left, and those of which iceoryx2 cannot.
+fn clean_up(config: &Config, folders: &Folders) {
+    let _ = Node::<ipc::Service>::list(config, |state| {
+        let id = state.node_id().value();
+        if let NodeState::Dead(dead) = state
+            && dead.try_remove_stale_resources().is_err()
+        {
+            folders.forget(id);
+        }
+        CallbackProgression::Continue
+    });
 }
 
 /// Whether a node other than that of this number lives in the domain, or may.

@@ -78,31 +78,49 @@ impl Folders {
         if files.is_empty() { Ok(()) } else { Err(ShmError::Unfinished { files }) }
     }
 
-    /// Removes the files of a domain in which no process lives; what a dead one has made in part, iceoryx2 would wait for.
-    /// Processes register before they make any, but for the counter.
-    pub fn clear_remains(&self, has_peers: impl FnOnce() -> bool) {
+    /// Removes the files of a domain in which no process lives, after `clean_up` has removed what iceoryx2 can: what a dead
+    /// one has made in part, it would wait for. Processes register before they make any, but for the counter.
+    pub fn clear_remains(&self, has_peers: impl FnOnce() -> bool, clean_up: impl FnOnce()) {
         let made = |file: &PathBuf| file.metadata().and_then(|found| found.modified()).ok();
-        let is_counter =
-            |file: &PathBuf| file.file_name().is_some_and(|name| self.is_counter(&name.to_string_lossy()));
-        let files = self.files().into_iter().filter(|file| !is_counter(file));
+        let files = self
+            .files()
+            .into_iter()
+            .filter(|file| file.file_name().is_none_or(|name| !self.is_counter(&name.to_string_lossy())));
         let files: Vec<_> = files.map(|file| (made(&file), file)).collect();
         if files.is_empty() || has_peers() {
             return;
         }
         // Not one that another process has made anew meanwhile.
-        let remains = files.into_iter().filter(|(then, file)| made(file) == *then);
-        remains.for_each(|(_, file)| drop(fs::remove_file(file)));
+        let remove = |(then, file): &(_, PathBuf)| {
+            if made(file) == *then {
+                let _ = fs::remove_file(file);
+            }
+        };
+        files.iter().filter(|(_, file)| is_unfinished(file, &self.service)).for_each(remove);
+        clean_up();
+        files.iter().for_each(remove);
     }
 
-    /// Files of the domain in shared memory and among the services.
+    /// Removes what is registered of a dead node of this number: a folder, and files of the domain.
+    pub fn forget(&self, node: u128) {
+        let [_, _, nodes] = &self.folders;
+        let _ = fs::remove_dir_all(nodes.join(node.to_string()));
+        let name = format!("{}{node}", self.prefix);
+        let is_its = |file: &PathBuf| file.file_stem().is_some_and(|stem| stem.to_string_lossy() == name);
+        self.of_domain(nodes).into_iter().filter(is_its).for_each(|file| drop(fs::remove_file(file)));
+    }
+
+    fn of_domain(&self, folder: &Path) -> Vec<PathBuf> {
+        let names = names(folder).into_iter().filter(|name| name.starts_with(&self.prefix));
+        names.map(|name| folder.join(name)).collect()
+    }
+
+    /// Files of the domain: its shared memory, its services and the sockets of its events.
     fn files(&self) -> Vec<PathBuf> {
-        let [_, services, _] = &self.folders;
-        let of_domain = |folder: &Path| {
-            let names = names(folder).into_iter().filter(|name| name.starts_with(&self.prefix));
-            names.map(|name| folder.join(name)).collect::<Vec<_>>()
-        };
-        let mut files = of_domain(Path::new(SHARED_MEMORY));
-        files.extend(of_domain(services).into_iter().filter(|file| has_ending(file, &self.service)));
+        let [root, services, _] = &self.folders;
+        let mut files = self.of_domain(Path::new(SHARED_MEMORY));
+        files.extend(self.of_domain(services).into_iter().filter(|file| has_ending(file, &self.service)));
+        files.extend(self.of_domain(root));
         files
     }
 
@@ -143,14 +161,15 @@ fn room() -> Option<u64> {
     None
 }
 
-/// Whether a file is still being made: by its mode, which iceoryx2 sets at the end, or because nothing is in it.
+/// Whether a file is still being made: by its mode, which iceoryx2 sets at the end, or because nothing is in it. Sockets are
+/// made at once.
 #[cfg(unix)]
 fn is_unfinished(file: &Path, service: &str) -> bool {
     use std::os::unix::fs::MetadataExt;
     let Ok(found) = file.metadata() else { return false };
     match has_ending(file, service) {
         true => found.mode() & 0o200 != 0,
-        false => found.len() == 0 || found.mode() & 0o400 == 0,
+        false => found.is_file() && (found.len() == 0 || found.mode() & 0o400 == 0),
     }
 }
 

@@ -71,17 +71,32 @@ fn leave_unfinished(domain: &str) -> [PathBuf; 2] {
 
 #[test]
 fn what_a_process_left_that_died_while_it_made_it_is_removed_or_named() {
-    let folder = temporary();
+    let publish_in =
+        |domain: &str| publish(temporary().path(), None, Some(domain)).output().expect("the program starts");
     let domain = domain_name();
     leave_unfinished(&domain);
-    let output = publish(folder.path(), None, Some(&domain)).output().expect("the program starts");
+    let output = publish_in(&domain);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(files(&format!("{domain}_")), Vec::<PathBuf>::new());
+
+    // What iceoryx2 knows to remove, it removes.
+    let mut running = Command::new(env!("CARGO_BIN_EXE_flockform"))
+        .args(["node", "square", "--transport", "shm"])
+        .env("FLOCKFORM_SHM_DOMAIN", &domain)
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program starts");
+    super::support::until("it has begun", || (files(&format!("{domain}_")).len() > 20).then_some(()));
+    running.kill().expect("it runs");
+    running.wait().expect("it ends");
+    let output = publish_in(&domain);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert_eq!(files(&format!("{domain}_")), Vec::<PathBuf>::new());
 
     // A peer may be the one that makes them.
     let peer = super::support::domain(&domain).join("test").expect("shared memory");
     let left = leave_unfinished(&domain);
-    let output = publish(folder.path(), None, Some(&domain)).output().expect("the program starts");
+    let output = publish_in(&domain);
     let message = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{message}");
     let is_named = |file: &PathBuf| message.contains(&*file.to_string_lossy());

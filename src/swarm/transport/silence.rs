@@ -54,13 +54,13 @@ impl Silence {
         }
         let (leaders, followers): (Vec<usize>, Vec<usize>) =
             self.missing.iter().partition(|&&m| control.formation().leads(m));
-        let (who, what) = match (control.has_begun(), leaders.is_empty()) {
+        let (robots, what) = match (control.has_begun(), leaders.is_empty()) {
             (false, false) => (leaders, "the programs of the leaders wait, and no robot moves before"),
             (true, false) => (self.missing.clone(), "the swarm flies without"),
             (_, true) => (followers, "the swarm flies without"),
         };
-        let of = names(control, &who);
-        Some(format!("no pose of {of} has been believed for {seconds} s, on {}: {what}", topic(&who)))
+        let of = names(control, &robots);
+        Some(format!("no pose of {of} has been believed for {seconds} s, on {}: {what}", topic(&robots)))
     }
 }
 
