@@ -66,8 +66,8 @@ impl Domain {
         let name = NodeName::new(name).map_err(|error| refused(error.to_string()))?;
         let folders = Folders::of(&self.config);
         folders.open();
-        folders.clear_remains(|| has_peers(&self.config, None), || clean_up(&self.config, &folders));
-        folders.clear_unfinished(|| has_peers(&self.config, None))?;
+        folders.clear_remains(|| has_peers(&self.config), || clean_up(&self.config, &folders));
+        folders.clear_unfinished()?;
         let node = NodeBuilder::new()
             .name(&name)
             .config(&self.config)
@@ -93,11 +93,11 @@ fn clean_up(config: &Config, folders: &Folders) {
     });
 }
 
-/// Whether a node other than that of this number lives in the domain, or may.
-fn has_peers(config: &Config, own: Option<u128>) -> bool {
+/// Whether a node lives in the domain, or may.
+fn has_peers(config: &Config) -> bool {
     let mut found = false;
     let listed = Node::<ipc::Service>::list(config, |state| {
-        found |= !matches!(state, NodeState::Dead(_)) && own != Some(state.node_id().value());
+        found |= !matches!(state, NodeState::Dead(_));
         CallbackProgression::Continue
     });
     found || listed.is_err()
@@ -115,7 +115,7 @@ pub struct Peer {
 impl Peer {
     /// Refuses or removes what processes left that died while they made it, before it is waited for.
     pub(super) fn clear_unfinished(&self) -> Result<(), ShmError> {
-        self.folders.clear_unfinished(|| has_peers(&self.config, Some(self.node.id().value())))
+        self.folders.clear_unfinished()
     }
 
     /// Its node of iceoryx2, for services of your own.

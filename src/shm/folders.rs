@@ -50,11 +50,11 @@ impl Folders {
     }
 
     /// Waits for files of the domain that are being made, and removes those that a process left which died while it made
-    /// them: iceoryx2 would refuse them for good, or wait for them without end. Their maker may live where any peer does.
+    /// them: iceoryx2 would refuse them for good, or wait for them without end.
     ///
     /// # Errors
-    /// Names the files that stay.
-    pub fn clear_unfinished(&self, has_peers: impl FnOnce() -> bool) -> Result<(), ShmError> {
+    /// Names the files that stay: a process has them open, or they are another user's.
+    pub fn clear_unfinished(&self) -> Result<(), ShmError> {
         let begun = Instant::now();
         let is_left = |file: &PathBuf| {
             let modified = file.metadata().and_then(|found| found.modified());
@@ -66,15 +66,9 @@ impl Folders {
             std::thread::sleep(Duration::from_millis(10));
             files = self.unfinished();
         }
-        if files.is_empty() {
-            return Ok(());
-        }
-        if !has_peers() {
-            files.retain(|file| {
-                is_left(file) && is_unfinished(file, &self.service) && fs::remove_file(file).is_err()
-            });
-            files.retain(|file| file.exists());
-        }
+        files.retain(|file| is_left(file) && is_unfinished(file, &self.service));
+        files.retain(|file| is_open(file) || fs::remove_file(file).is_err());
+        files.retain(|file| file.exists());
         if files.is_empty() { Ok(()) } else { Err(ShmError::Unfinished { files }) }
     }
 
@@ -127,6 +121,17 @@ impl Folders {
     fn unfinished(&self) -> Vec<PathBuf> {
         self.files().into_iter().filter(|file| is_unfinished(file, &self.service)).collect()
     }
+}
+
+/// Whether a process has a file open, or may: its maker has until it is finished.
+fn is_open(file: &Path) -> bool {
+    let processes = Path::new("/proc");
+    let is_process = |name: &String| name.bytes().all(|byte| byte.is_ascii_digit());
+    let mut folders =
+        names(processes).into_iter().filter(is_process).map(|name| processes.join(name).join("fd"));
+    let is_it = |link: PathBuf| fs::read_link(link).is_ok_and(|open| open == file);
+    !cfg!(target_os = "linux")
+        || folders.any(|folder| names(&folder).iter().any(|number| is_it(folder.join(number))))
 }
 
 fn has_ending(file: &Path, ending: &str) -> bool {

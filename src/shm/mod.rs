@@ -79,9 +79,9 @@ pub enum ShmError {
         /// The error of iceoryx2.
         reason: String,
     },
-    /// Processes left files that they were making, and others of the domain run on.
+    /// A process has not finished files that it makes, and has them open.
     #[error(
-        "a process died while it made {}, for which iceoryx2 waits without end\n  help: end all programs of this domain and start again, which removes {it}, remove {it} yourself, or take another {variable}",
+        "a process does not finish {}, for which iceoryx2 waits without end\n  help: end all programs of this domain and start again, which removes {it}, remove {it} yourself, or take another {variable}",
         listed(files),
         it = if files.len() == 1 { "it" } else { "them" },
         variable = domain::VARIABLE

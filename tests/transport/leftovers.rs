@@ -93,16 +93,20 @@ fn what_a_process_left_that_died_while_it_made_it_is_removed_or_named() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert_eq!(files(&format!("{domain}_")), Vec::<PathBuf>::new());
 
-    // A peer may be the one that makes them.
+    // A process that has them open may be about to finish them; others may live.
     let peer = super::support::domain(&domain).join("test").expect("shared memory");
     let left = leave_unfinished(&domain);
+    let open = left.each_ref().map(|file| std::fs::File::open(file).expect("it is there"));
     let output = publish_in(&domain);
     let message = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{message}");
     let is_named = |file: &PathBuf| message.contains(&*file.to_string_lossy());
     assert!(left.iter().all(is_named) && message.contains("FLOCKFORM_SHM_DOMAIN"), "{message}");
     assert!(left.iter().all(|file| file.exists()));
-    left.iter().for_each(|file| std::fs::remove_file(file).expect("it is there"));
+    drop(open);
+    let output = publish_in(&domain);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(left.iter().all(|file| !file.exists()));
     drop(peer);
 }
 
