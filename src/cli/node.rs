@@ -26,7 +26,7 @@ use super::output::own_command_line;
 use super::recording::{RecordArguments, close};
 use super::supervise::{Life, supervise};
 use super::swarm::SwarmFileArguments;
-use super::{Refusal, say};
+use super::{FAILED, Refusal, on_terminal, say};
 use super::{interrupt, log};
 
 /// Commands of the page that wait for the loop, which takes all of them in a period.
@@ -96,6 +96,8 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
         Ok(life) => life,
         Err(code) => return Ok(code),
     };
+    // A node has a leave to take, and files of shared memory to remove: an interrupt waits until it is open.
+    let interrupted = interrupt::serves();
     let swarm = arguments.swarm.load()?;
     let name = arguments.member.as_deref();
     match life {
@@ -107,12 +109,11 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
                 .live
                 .then(|| LivePage::open(arguments, life.number(), left.as_ref()))
                 .transpose()?;
-            // Others know the node from now on: an end has a leave to take.
-            interrupt::serves();
             let mut node = FormationNode::open(&swarm, ros, name).map_err(|error| refused(&swarm, error))?;
             let (member, namespace) = (arguments.member.clone(), Some(node.fleet().to_owned()));
             let mut about = About { member, namespace, ..arguments.swarm.about("node", &swarm) };
             about.set.extend(node.overrides(&swarm));
+            about.taken_over = left.as_ref().map(|left| left.node.control().clone());
             let recording = arguments.record.open(&about, false, life.number())?;
             if let Some(recording) = &recording {
                 node.record(recording.sink()).map_err(NodeError::from)?;
@@ -133,13 +134,15 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
                 .map(|page| page.serve(&swarm, &mut node, arguments.allow_commands))
                 .transpose()?;
             node.watch_middleware().map_err(NodeError::from)?;
-            let well = node.run_while(interrupt::serves(), &mut |node| {
+            let well = node.run_while(interrupted, &mut |node| {
                 page.iter().for_each(|page| page.feed.offer(node.control()));
                 life.send(|| Left { node: node.kept(), page: page.as_ref().map(|page| page.place.clone()) })
             });
             live::close(page.and_then(|page| page.door));
-            say(&close(recording)?)?;
-            return Ok(ended(well));
+            // An interrupt is the end of every node: lost output is no news of it, but an error of its own.
+            let lost = close(recording).map_err(Refusal::from).and_then(|words| say(&words)).err();
+            lost.iter().for_each(|lost| note!("error: {}", on_terminal(&lost.to_string())));
+            return Ok(if well && lost.is_some() { ExitCode::from(FAILED) } else { ended(well) });
         }
         None => {
             arguments.record.require_none("--transport shm")?;
@@ -149,8 +152,6 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
             let domain = Domain::from_environment()?;
             let mut node =
                 shm::FormationNode::open(&swarm, &domain, name).map_err(|error| refused(&swarm, error))?;
-            // What is said to serve is ended as what serves.
-            let interrupted = interrupt::serves();
             announce(&swarm, node.control());
             node.run(interrupted)?;
         }
@@ -286,12 +287,12 @@ pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCod
         Ok(life) => life,
         Err(code) => return Ok(code),
     };
+    let interrupted = interrupt::serves();
     let swarm = arguments.swarm.load()?;
     let announce = |count| tracing::info!("`{}`: {count} simulated robots", swarm.name);
     match life {
         Some(mut life) => {
             let layout = if arguments.node_per_robot { Layout::NodePerRobot } else { Layout::OneNode };
-            interrupt::serves();
             bound_opening();
             let mut robots = RobotNodes::open(&swarm, ros, layout)?;
             if let Some(level) = log::level() {
@@ -306,14 +307,11 @@ pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCod
                 robots.restore(&left);
             }
             robots.watch_middleware().map_err(NodeError::from)?;
-            return Ok(ended(
-                robots.run_while(interrupt::serves(), &mut |robots| life.send(|| robots.kept())),
-            ));
+            return Ok(ended(robots.run_while(interrupted, &mut |robots| life.send(|| robots.kept()))));
         }
         None if arguments.node_per_robot => return Err(Refusal::NoNodes),
         None => {
             let mut robots = SimulatedRobots::open(&swarm, &Domain::from_environment()?)?;
-            let interrupted = interrupt::serves();
             announce(robots.fleet().robots().len());
             robots.run(interrupted)?;
         }

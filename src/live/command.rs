@@ -164,17 +164,21 @@ impl Command {
 
     fn check(&self) -> Result<(), String> {
         let is_text = |text: &str| text.len() <= 200 && !text.contains(char::is_control);
-        let holds = match self {
-            Command::Speed { value } => (0.01..=1000.0).contains(value),
-            Command::Set { key, value } => is_text(key) && is_text(value) && !key.contains('='),
-            Command::Ask { quantity: text } | Command::SetFormation { name: text, .. } => is_text(text),
-            Command::Drawn { ms } => (0.0..=1e6).contains(ms),
-            Command::Squeeze { by } => by.iter().all(|factor| (0.1..=10.0).contains(factor)),
-            Command::Design { edit: Edit::Rename { name, .. } } => is_text(name),
-            Command::Cut { from, to } => from != to,
-            _ => true,
+        let text = "give texts of at most 200 characters, without control characters, and keys without `=`";
+        let (holds, help) = match self {
+            Command::Speed { value } => ((0.01..=1000.0).contains(value), "give a speed of 0.01 to 1000"),
+            Command::Set { key, value } => (is_text(key) && is_text(value) && !key.contains('='), text),
+            Command::Ask { quantity: name }
+            | Command::SetFormation { name, .. }
+            | Command::Design { edit: Edit::Rename { name, .. } } => (is_text(name), text),
+            Command::Drawn { ms } => ((0.0..=1e6).contains(ms), "give a time of 0 to 1e6 ms"),
+            Command::Squeeze { by } => {
+                (by.iter().all(|factor| (0.1..=10.0).contains(factor)), "give factors of 0.1 to 10")
+            }
+            Command::Cut { from, to } => (from != to, "give a cut two different ends"),
+            _ => (true, ""),
         };
-        if holds { Ok(()) } else { Err(format!("out of range: {self:?}")) }
+        if holds { Ok(()) } else { Err(format!("out of range: {help}")) }
     }
 }
 
@@ -190,6 +194,8 @@ mod tests {
         assert!(matches!(moved, Ok(Command::SetFormation { stretch: [1.0, 1.0], duration: 2.0, .. })));
         let placed = Command::parse(r#"{"do":"design","edit":{"what":"place","at":[1,0],"leads":false}}"#);
         assert!(matches!(placed, Ok(Command::Design { edit: Edit::Place { leads: false, .. } })));
+        let speed = Command::parse(r#"{"do":"speed","value":0}"#).expect_err("none");
+        assert_eq!(speed, "out of range: give a speed of 0.01 to 1000");
         let wrong = [
             "",
             r#"{"do":"design"}"#,

@@ -14,9 +14,12 @@ use super::rosbag2::{self, Channel, Span};
 use crate::messages::builtin_interfaces::Time;
 use crate::messages::definitions;
 use crate::messages::recorder::RecordedMessage;
+use crate::swarm::control::ControlSnapshot;
 
 /// Name of the metadata record that says what was recorded.
 pub(crate) const METADATA: &str = "flockform";
+/// Key of it for the state that the loop took over.
+pub(crate) const TAKEN_OVER: &str = "taken_over";
 /// Name of the attachment that is the swarm file.
 pub const SWARM: &str = "swarm.toml";
 /// Bytes before compression that are written at once: what a killed program loses.
@@ -39,6 +42,8 @@ pub struct About {
     pub member: Option<String>,
     /// Namespace of the node's fleet.
     pub namespace: Option<String>,
+    /// The state that the loop took over from the process before it.
+    pub taken_over: Option<ControlSnapshot>,
 }
 
 /// A recording under way.
@@ -83,7 +88,11 @@ impl Recording {
             return;
         }
         if let Err(error) = self.try_to_write(taped) {
-            tracing::warn!("the recording {} ends here: {}", self.path.display(), super::reason(&error));
+            tracing::warn!(
+                "the recording ends here, and what there is of it is in {}: {}",
+                self.part.display(),
+                super::reason(&error)
+            );
             self.failure = Some(error);
         }
     }
@@ -210,7 +219,13 @@ fn describe(writer: &mut Writer<BufWriter<File>>, about: &About) -> Result<(), m
     .map(|(key, value)| (key.to_owned(), value))
     .into();
     let folder = about.folder.as_ref().map(|folder| folder.display().to_string());
-    for (key, value) in [("member", &about.member), ("namespace", &about.namespace), ("folder", &folder)] {
+    let state = about.taken_over.as_ref().and_then(|state| serde_json::to_string(state).ok());
+    for (key, value) in [
+        ("member", &about.member),
+        ("namespace", &about.namespace),
+        ("folder", &folder),
+        (TAKEN_OVER, &state),
+    ] {
         if let Some(value) = value {
             metadata.insert(key.to_owned(), value.clone());
         }

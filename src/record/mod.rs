@@ -65,7 +65,7 @@ pub enum RecordError {
         source: std::io::Error,
     },
     /// A recording could not be written on.
-    #[error("{} cannot be written: {}", .path.display(), reason(source))]
+    #[error("the recording ends early, and what there is of it is in {}: {}", .path.display(), reason(source))]
     Write {
         /// The unfinished file.
         path: PathBuf,

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::file::TAKEN_OVER;
 use super::topics::{Heard, of_robots, stamped, topics};
 use super::{Entry, Reader, RecordError};
 use crate::flock::vectors::distance;
@@ -21,7 +22,7 @@ use crate::messages::names::Names;
 use crate::messages::recorder::{parameters, set_parameter};
 use crate::messages::std_msgs::Header;
 use crate::scene::swarm::Swarm;
-use crate::swarm::control::{Control, Mode, scope};
+use crate::swarm::control::{Control, ControlSnapshot, Mode, scope};
 use crate::swarm::flight::{FlightCommand, commands};
 use crate::swarm::watch::Range;
 
@@ -152,6 +153,8 @@ struct Replay {
     control: Control,
     /// The loop before its first tick.
     fresh: Control,
+    /// The state of the process before, which the loop takes over before its first tick.
+    taken_over: Option<ControlSnapshot>,
     /// The parameters that the file and the overrides of the recording gave.
     as_recorded: Vec<(&'static str, f64)>,
     topics: BTreeMap<String, Heard>,
@@ -206,6 +209,8 @@ impl Replay {
             Some(flown) => of_robots(flown, &before, &names)?.keys().all(|topic| topics.contains_key(topic)),
             None => false,
         };
+        let taken_over =
+            described.metadata.get(TAKEN_OVER).map(|text| taken_over(reader, text)).transpose()?;
         let is_simulated = described.metadata.get("source").is_some_and(|source| source == "swarm");
         let commands = if is_simulated { commands::of(swarm, &control)? } else { Vec::new() };
         let robot = |name: &String| RobotDifference { name: name.clone(), ..RobotDifference::default() };
@@ -218,6 +223,7 @@ impl Replay {
             today: vec![None; count],
             recorded: vec![None; count],
             fresh: control.clone(),
+            taken_over,
             control,
             topics,
             has_topics,
@@ -355,7 +361,12 @@ impl Replay {
     }
 
     fn move_leaders(&mut self, request: &SetFormationRequest) {
-        if let Err(why) = set_formation(&mut self.control, request) {
+        let time = self.control.program_time();
+        // Whether it can be flown was asked in the flight, with the limits of then.
+        let named = self.control.formation().manoeuvre(&request.name, time);
+        if let Some(manoeuvre) = named.filter(|_| self.control.formation().is_led_here()) {
+            self.control.begin(&manoeuvre);
+        } else if let Err(why) = set_formation(&mut self.control, request) {
             self.refusal.get_or_insert(format!("the leaders cannot move as they did: {why}"));
         }
     }
@@ -371,6 +382,9 @@ impl Replay {
     fn tick(&mut self, now: f64) {
         self.compare();
         self.begun = true;
+        if let Some(state) = self.taken_over.take() {
+            self.control.restore(state);
+        }
         if !self.active {
             self.control.set_active(false);
         } else if !self.has_events {
@@ -435,6 +449,18 @@ impl Replay {
             }
         }
     }
+}
+
+/// The state that a recorded loop took over.
+fn taken_over(reader: &Reader, text: &str) -> Result<ControlSnapshot, RecordError> {
+    /// More than a loop runs through; a body that moves by itself is taken through all of them.
+    const MOST_PERIODS: u64 = 100_000_000;
+    let state: Option<ControlSnapshot> = serde_json::from_str(text).ok();
+    state.filter(|state| state.periods() <= MOST_PERIODS).ok_or_else(|| RecordError::Unusable {
+        path: reader.path().to_owned(),
+        what: format!("its `{TAKEN_OVER}` is no state of a loop"),
+        help: "give a recording as --record has written it".to_owned(),
+    })
 }
 
 /// Reads a recording and replays it.

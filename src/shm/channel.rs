@@ -13,7 +13,7 @@ use iceoryx2::prelude::{
 };
 use iceoryx2::sample::Sample;
 use iceoryx2::sample_mut::SampleMut;
-use iceoryx2::service::builder::event::EventOpenOrCreateError;
+use iceoryx2::service::builder::event::{EventOpenError as EventRefusal, EventOpenOrCreateError};
 use iceoryx2::service::builder::publish_subscribe::{
     PublishSubscribeOpenError as Refusal, PublishSubscribeOpenOrCreateError as OpenError,
 };
@@ -22,6 +22,7 @@ use iceoryx2::service::port_factory::{event, publish_subscribe};
 use super::payload::{Header, Payload};
 use super::wait::Bell;
 use super::{Peer, ShmError, domain, folders};
+use crate::scene::text::counted;
 
 /// How many can share a service: fixed by the process that creates it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,6 +92,7 @@ impl<T: Payload> Opened<T> {
             .as_str()
             .try_into()
             .map_err(|_| wrong("no name of a service".into(), "give another name"))?;
+        peer.clear_unfinished()?;
         let slices = again(
             || open_slices::<T>(peer, &service, capacity),
             |error| {
@@ -107,7 +109,12 @@ impl<T: Payload> Opened<T> {
             |error| matches!(error, EventOpenOrCreateError::SystemInFlux),
         )
         .map_err(|error| {
-            wrong(error.to_string(), "another program made its event otherwise: start flockform first")
+            use EventOpenOrCreateError::EventOpenError;
+            let help = match error {
+                EventOpenError(EventRefusal::HangsInCreation) => hangs(),
+                _ => "another program made its event otherwise: start flockform first".into(),
+            };
+            wrong(error.to_string(), &help)
         })?;
         Ok(Self { name, slices, event })
     }
@@ -168,6 +175,14 @@ fn open_event(
         .open_or_create()
 }
 
+/// The remedy for a service that its maker has left in part while others of the domain live.
+fn hangs() -> String {
+    format!(
+        "a process died while it made it: end all programs of this domain and start again, or take another {}",
+        domain::VARIABLE
+    )
+}
+
 /// The meaning of an error of iceoryx2 for a user.
 fn explain<T: Payload>(
     peer: &Peer,
@@ -195,7 +210,7 @@ fn explain<T: Payload>(
             "another version of iceoryx2 made it: peers need 0.10".into()
         }
         OpenError::PublishSubscribeOpenError(Refusal::ServiceInCorruptedState | Refusal::HangsInCreation) => {
-            format!("a process died while it made it: take another {}", domain::VARIABLE)
+            hangs()
         }
         _ => format!(
             "another program made it otherwise: start flockform first, or give it max_publishers({}), \
@@ -226,6 +241,8 @@ pub struct Writer<T: Payload> {
     notifier: Notifier<ipc::Service>,
     factory: Slices<T>,
     sequence: u64,
+    /// Other writers at the last look \[1\].
+    others: usize,
 }
 
 impl<T: Payload> Writer<T> {
@@ -263,7 +280,7 @@ impl<T: Payload> Writer<T> {
         let notifier = opened.event.notifier_builder().create();
         let notifier = notifier.map_err(|error| opened.port("writer", error, capacity.writers))?;
         let Opened { name: service, slices: factory, .. } = opened;
-        Ok(Self { service, publisher, notifier, factory, sequence: 0 })
+        Ok(Self { service, publisher, notifier, factory, sequence: 0, others: 0 })
     }
 
     /// Borrows a slice of `count` elements, fills it in place with `element`, hands it to all readers and wakes them.
@@ -306,6 +323,21 @@ impl<T: Payload> Writer<T> {
 
     fn refused(&self, error: impl std::fmt::Display) -> ShmError {
         ShmError::Send { service: self.service.clone(), reason: error.to_string() }
+    }
+
+    /// Warns when other processes have come that write the same, with `what` that does.
+    pub(super) fn warn_of_others(&mut self, what: &str) {
+        use iceoryx2::prelude::PortFactory as _;
+        let others = self.factory.dynamic_config().number_of_publishers().saturating_sub(1);
+        if others > self.others {
+            tracing::warn!(
+                "{}: {}: {what}; end one, or keep them apart by {}",
+                self.service,
+                counted(others, "other writer"),
+                domain::VARIABLE
+            );
+        }
+        self.others = others;
     }
 
     /// Readers now \[1\].

@@ -1,7 +1,9 @@
 //! Which processes meet: those of one domain on one computer.
 
-use iceoryx2::prelude::{Config, FileName, LogLevel, Node, NodeBuilder, NodeName, SignalHandlingMode, ipc};
-use iceoryx2::prelude::{SemanticString, set_log_level_from_env_or};
+use iceoryx2::prelude::{
+    CallbackProgression, Config, FileName, LogLevel, Node, NodeBuilder, NodeName, NodeState,
+};
+use iceoryx2::prelude::{SemanticString, SignalHandlingMode, ipc, set_log_level_from_env_or};
 
 use super::folders::Folders;
 use super::{ShmError, folders};
@@ -64,6 +66,8 @@ impl Domain {
         let name = NodeName::new(name).map_err(|error| refused(error.to_string()))?;
         let folders = Folders::of(&self.config);
         folders.open();
+        folders.clear_remains(|| has_peers(&self.config), || clean_up(&self.config, &folders));
+        folders.clear_unfinished()?;
         let node = NodeBuilder::new()
             .name(&name)
             .config(&self.config)
@@ -72,8 +76,31 @@ impl Domain {
             .map_err(|error| refused(error.to_string()))?;
         // The last of other peers may have removed them meanwhile, and iceoryx2 have made them this user's alone.
         folders.open();
-        Ok(Peer { node, config: self.config.clone(), _folders: folders })
+        Ok(Peer { node, config: self.config.clone(), folders })
     }
+}
+
+/// Removes what dead nodes have left, and those of which iceoryx2 cannot.
+fn clean_up(config: &Config, folders: &Folders) {
+    let _ = Node::<ipc::Service>::list(config, |state| {
+        let id = state.node_id().value();
+        if let NodeState::Dead(dead) = state
+            && dead.try_remove_stale_resources().is_err()
+        {
+            folders.forget(id);
+        }
+        CallbackProgression::Continue
+    });
+}
+
+/// Whether a node lives in the domain, or may.
+fn has_peers(config: &Config) -> bool {
+    let mut found = false;
+    let listed = Node::<ipc::Service>::list(config, |state| {
+        found |= !matches!(state, NodeState::Dead(_));
+        CallbackProgression::Continue
+    });
+    found || listed.is_err()
 }
 
 /// A process's place in a domain, of one thread.
@@ -82,10 +109,15 @@ pub struct Peer {
     pub(super) node: Node<ipc::Service>,
     pub(super) config: Config,
     // Dropped after the node, which has its files there.
-    _folders: Folders,
+    folders: Folders,
 }
 
 impl Peer {
+    /// Refuses or removes what processes left that died while they made it, before it is waited for.
+    pub(super) fn clear_unfinished(&self) -> Result<(), ShmError> {
+        self.folders.clear_unfinished()
+    }
+
     /// Its node of iceoryx2, for services of your own.
     pub fn node(&self) -> &Node<ipc::Service> {
         &self.node

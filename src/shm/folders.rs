@@ -5,8 +5,11 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use iceoryx2::prelude::Config;
+
+use super::ShmError;
 
 /// Removes them when it is dropped, which must be after all that has files in them.
 #[derive(Debug)]
@@ -16,10 +19,16 @@ pub(super) struct Folders {
     /// Of all files of the domain, and of the one in which it counts its nodes.
     prefix: String,
     counter: String,
+    /// Of the files that describe services.
+    service: String,
 }
 
 /// Where the system keeps shared memory as files.
 const SHARED_MEMORY: &str = "/dev/shm";
+
+/// Time after which a file that is still being made is one that its maker left: iceoryx2 makes one in milliseconds, and
+/// gives up waiting for most after a second.
+const MAKING: Duration = Duration::from_secs(2);
 
 impl Folders {
     pub fn of(config: &Config) -> Self {
@@ -27,7 +36,8 @@ impl Folders {
         let folders =
             [*global.root_path(), global.service_dir(), global.node_dir()].map(|path| as_path(&path));
         let (prefix, counter) = (global.prefix.to_string(), global.node.global_mgmt_suffix.to_string());
-        Self { folders, prefix, counter }
+        let service = global.service.static_config_storage_suffix.to_string();
+        Self { folders, prefix, counter, service }
     }
 
     /// Makes those that are missing, and opens this user's to all.
@@ -38,6 +48,139 @@ impl Folders {
             let _ = open_to_all(folder);
         }
     }
+
+    /// Waits for files of the domain that are being made, and removes those that a process left which died while it made
+    /// them: iceoryx2 would refuse them for good, or wait for them without end.
+    ///
+    /// # Errors
+    /// Names the files that stay: a process has them open, or they are another user's.
+    pub fn clear_unfinished(&self) -> Result<(), ShmError> {
+        let begun = Instant::now();
+        let is_left = |file: &PathBuf| {
+            let modified = file.metadata().and_then(|found| found.modified());
+            // Of a clock that was set back none is old.
+            modified.is_ok_and(|time| time.elapsed().is_ok_and(|age| age >= MAKING))
+        };
+        let mut files = self.unfinished();
+        while !files.iter().all(is_left) && begun.elapsed() < 2 * MAKING {
+            std::thread::sleep(Duration::from_millis(10));
+            files = self.unfinished();
+        }
+        files.retain(|file| is_left(file) && is_unfinished(file, &self.service));
+        files.retain(|file| is_open(file) || fs::remove_file(file).is_err());
+        files.retain(|file| file.exists());
+        if files.is_empty() { Ok(()) } else { Err(ShmError::Unfinished { files }) }
+    }
+
+    /// Removes the files of a domain in which no process lives, after `clean_up` has removed what iceoryx2 can: what a dead
+    /// one has made in part, it would wait for. Processes register before they make any, but for the counter.
+    pub fn clear_remains(&self, has_peers: impl FnOnce() -> bool, clean_up: impl FnOnce()) {
+        let made = |file: &PathBuf| file.metadata().and_then(|found| found.modified()).ok();
+        let files = self
+            .files()
+            .into_iter()
+            .filter(|file| file.file_name().is_none_or(|name| !self.is_counter(&name.to_string_lossy())));
+        let files: Vec<_> = files.map(|file| (made(&file), file)).collect();
+        if files.is_empty() || has_peers() {
+            return;
+        }
+        // Not one that another process has made anew meanwhile.
+        let remove = |(then, file): &(_, PathBuf)| {
+            if made(file) == *then {
+                let _ = fs::remove_file(file);
+            }
+        };
+        files.iter().filter(|(_, file)| is_unfinished(file, &self.service)).for_each(remove);
+        clean_up();
+        files.iter().for_each(remove);
+    }
+
+    /// Removes what is registered of a dead node of this number: a folder, and files of the domain.
+    pub fn forget(&self, node: u128) {
+        let [_, _, nodes] = &self.folders;
+        let _ = fs::remove_dir_all(nodes.join(node.to_string()));
+        let name = format!("{}{node}", self.prefix);
+        let is_its = |file: &PathBuf| file.file_stem().is_some_and(|stem| stem.to_string_lossy() == name);
+        self.of_domain(nodes).into_iter().filter(is_its).for_each(|file| drop(fs::remove_file(file)));
+    }
+
+    fn of_domain(&self, folder: &Path) -> Vec<PathBuf> {
+        let names = names(folder).into_iter().filter(|name| name.starts_with(&self.prefix));
+        names.map(|name| folder.join(name)).collect()
+    }
+
+    /// Files of the domain: its shared memory, its services and the sockets of its events.
+    fn files(&self) -> Vec<PathBuf> {
+        let [root, services, _] = &self.folders;
+        let mut files = self.of_domain(Path::new(SHARED_MEMORY));
+        files.extend(self.of_domain(services).into_iter().filter(|file| has_ending(file, &self.service)));
+        files.extend(self.of_domain(root));
+        files
+    }
+
+    fn unfinished(&self) -> Vec<PathBuf> {
+        self.files().into_iter().filter(|file| is_unfinished(file, &self.service)).collect()
+    }
+}
+
+/// Whether a process has a file open, or may: its maker has until it is finished.
+fn is_open(file: &Path) -> bool {
+    let processes = Path::new("/proc");
+    let is_process = |name: &String| name.bytes().all(|byte| byte.is_ascii_digit());
+    let mut folders =
+        names(processes).into_iter().filter(is_process).map(|name| processes.join(name).join("fd"));
+    let is_it = |link: PathBuf| fs::read_link(link).is_ok_and(|open| open == file);
+    !cfg!(target_os = "linux")
+        || folders.any(|folder| names(&folder).iter().any(|number| is_it(folder.join(number))))
+}
+
+fn has_ending(file: &Path, ending: &str) -> bool {
+    file.to_string_lossy().ends_with(ending)
+}
+
+/// Refuses shared memory with less room than `bytes`: what is written beyond it ends a process without a word.
+///
+/// # Errors
+/// Says how much there is.
+pub(super) fn require_room(bytes: u64) -> Result<(), ShmError> {
+    match room() {
+        Some(free) if free < bytes => Err(ShmError::Room { folder: SHARED_MEMORY, needed: bytes, free }),
+        _ => Ok(()),
+    }
+}
+
+/// Free shared memory \[bytes\], where the system says.
+#[cfg(target_os = "linux")]
+fn room() -> Option<u64> {
+    let folder = std::ffi::CString::new(SHARED_MEMORY).ok()?;
+    let mut found = std::mem::MaybeUninit::<libc::statvfs64>::uninit();
+    // SAFETY: the call reads a string and writes a struct, both of which live as long as it takes.
+    let is_known = unsafe { libc::statvfs64(folder.as_ptr(), found.as_mut_ptr()) } == 0;
+    // SAFETY: a call that went well has written the struct.
+    let found = is_known.then(|| unsafe { found.assume_init() })?;
+    Some(found.f_bavail.saturating_mul(found.f_frsize))
+}
+
+#[cfg(not(target_os = "linux"))]
+fn room() -> Option<u64> {
+    None
+}
+
+/// Whether a file is still being made: by its mode, which iceoryx2 sets at the end, or because nothing is in it. Sockets are
+/// made at once.
+#[cfg(unix)]
+fn is_unfinished(file: &Path, service: &str) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let Ok(found) = file.metadata() else { return false };
+    match has_ending(file, service) {
+        true => found.mode() & 0o200 != 0,
+        false => found.is_file() && (found.len() == 0 || found.mode() & 0o400 == 0),
+    }
+}
+
+#[cfg(not(unix))]
+fn is_unfinished(_file: &Path, _service: &str) -> bool {
+    false
 }
 
 impl Drop for Folders {

@@ -6,6 +6,8 @@ use super::wait::Bell;
 use super::{Capacity, Peer, Reader, ShmError, Writer};
 use crate::swarm::control::Control;
 use crate::swarm::control::scope::NodeScope;
+use crate::swarm::pace::system_time;
+use crate::swarm::transport::complaints::Complaints;
 use crate::swarm::transport::{ControllerEnd, Received, RobotsEnd, Target};
 use crate::swarm::watch::{Pose, Range};
 
@@ -29,6 +31,8 @@ pub struct Controller {
     serves: Vec<bool>,
     tick: u64,
     refused: u64,
+    /// Of robots that the swarm does not have.
+    complaints: Complaints,
 }
 
 impl Controller {
@@ -53,7 +57,20 @@ impl Controller {
             serves: among(&part.mine),
             tick: 0,
             refused: 0,
+            complaints: Complaints::default(),
         })
+    }
+
+    /// Name of the service that carries poses.
+    pub(crate) fn poses(&self) -> &str {
+        self.poses.service()
+    }
+
+    /// Warns when another node of the same swarm comes; nodes of single robots are several.
+    pub(crate) fn warn_of_others(&mut self) {
+        if self.serves.iter().all(|serves| *serves) {
+            self.targets.warn_of_others("another node moves the same robots");
+        }
     }
 
     /// The bell that rings when poses or places of leaders arrive.
@@ -89,6 +106,13 @@ impl ControllerEnd for Controller {
                 let member = wire.member as usize;
                 if member >= count {
                     self.refused += 1;
+                    let text = format_args!(
+                        "{}: a pose is of robot {member}, and the swarm has {count}, from 0: it is of another swarm \
+                         file of this name",
+                        self.poses.service()
+                    );
+                    // One line for all of them.
+                    self.complaints.warn("no such robot", count, system_time(), &text);
                 } else if self.hears[member] {
                     take(Received::Pose(member, pose(wire, now)));
                 }
@@ -163,6 +187,11 @@ impl Robots {
     /// The bell that rings when targets arrive.
     pub fn bell(&self) -> Bell {
         self.targets.bell()
+    }
+
+    /// Warns when others come that send poses of the same robots.
+    pub(crate) fn warn_of_others(&mut self) {
+        self.poses.warn_of_others("others send poses of the same robots");
     }
 }
 

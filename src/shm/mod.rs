@@ -37,6 +37,8 @@ pub use domain::{Domain, Peer};
 pub use node::FormationNode;
 pub use robots::SimulatedRobots;
 
+use std::path::PathBuf;
+
 use crate::scene::SceneError;
 use crate::swarm::control::scope::NodeScopeError;
 
@@ -77,6 +79,31 @@ pub enum ShmError {
         /// The error of iceoryx2.
         reason: String,
     },
+    /// A process has not finished files that it makes, and has them open.
+    #[error(
+        "a process does not finish {}, for which iceoryx2 waits without end\n  help: end all programs of this domain and start again, which removes {it}, remove {it} yourself, or take another {variable}",
+        listed(files),
+        it = if files.len() == 1 { "it" } else { "them" },
+        variable = domain::VARIABLE
+    )]
+    Unfinished {
+        /// The files.
+        files: Vec<PathBuf>,
+    },
+    /// Shared memory is full.
+    #[error(
+        "{folder} has {} kB free, and this takes about {} kB\n  help: remove what is not needed there, or make it larger: `mount -o remount,size=64m {folder}`, of a container its `--shm-size`",
+        free / 1000,
+        needed / 1000
+    )]
+    Room {
+        /// Folder of shared memory.
+        folder: &'static str,
+        /// \[bytes\]
+        needed: u64,
+        /// \[bytes\]
+        free: u64,
+    },
     /// A service carries another type, or another version of it.
     #[error(
         "{service} carries `{found}`, and this program speaks `{expected}`\n  help: use programs of one version, or keep them apart by {variable}",
@@ -114,4 +141,14 @@ pub enum ShmError {
         /// The error of iceoryx2.
         reason: String,
     },
+}
+
+fn listed(files: &[PathBuf]) -> String {
+    files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>().join(", ")
+}
+
+/// Shared memory of one process of a swarm of so many robots \[bytes\]: of what its services and slices may grow to the part
+/// that is written, with a margin. Of 9 robots a node has written 260 kB, of 300 robots 390 kB; more readers take more slices.
+fn room_for_swarm(robots: usize) -> u64 {
+    (512 << 10) + (4 << 10) * robots as u64
 }

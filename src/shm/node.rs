@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use super::link::Controller;
 use super::payload::{Command, Formation, Member};
-use super::{Capacity, Domain, Peer, Reader, ShmError, Writer, wait};
+use super::{Capacity, Domain, Peer, Reader, ShmError, Writer, folders, room_for_swarm, wait};
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::RawCommands;
 use crate::swarm::control::Control;
@@ -17,6 +17,7 @@ use crate::swarm::control::state::{FormationState, MemberState};
 use crate::swarm::pace::{Due, Pace, system_time};
 use crate::swarm::plan::cautions;
 use crate::swarm::transport::complaints::Complaints;
+use crate::swarm::transport::silence::Silence;
 use crate::swarm::transport::{listen, serve};
 
 /// Leaf of the service that carries commands to the node.
@@ -43,6 +44,7 @@ pub struct FormationNode {
     state: Writer<Formation>,
     members: Writer<Member>,
     complaints: Complaints,
+    silence: Silence,
     missed: u64,
     unsent: u64,
     elapsed: f64,
@@ -61,6 +63,7 @@ impl FormationNode {
         if let Some(caution) = cautions::late_without_speed(control.limits()) {
             tracing::warn!("{caution}");
         }
+        folders::require_room(room_for_swarm(control.formation().count()))?;
         let peer = domain.join("flockform_node")?;
         let (space, capacity) = (&swarm.name, &Capacity::SWARM);
         Ok(Self {
@@ -71,6 +74,7 @@ impl FormationNode {
             state: Writer::open(&peer, space, STATE, capacity, 1)?,
             members: Writer::open(&peer, space, MEMBERS, capacity, control.formation().count())?,
             complaints: Complaints::default(),
+            silence: Silence::default(),
             missed: 0,
             unsent: 0,
             elapsed: 0.0,
@@ -116,6 +120,8 @@ impl FormationNode {
         self.obey();
         let sent = serve(&mut self.control, &self.part, &mut self.end, &mut self.complaints, now);
         self.note(sent);
+        let Self { silence, control, part, end, .. } = self;
+        silence.look(control, &part.heard, &|_| end.poses().to_owned());
         self.elapsed = begun.elapsed().as_secs_f64();
         if self.every(STATE_PERIOD) {
             let sent = self.report(now);
@@ -123,6 +129,7 @@ impl FormationNode {
         }
         if self.every(CLEANING_PERIOD) {
             self.peer.clean_up();
+            self.end.warn_of_others();
         }
     }
 

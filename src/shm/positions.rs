@@ -4,7 +4,7 @@
 //! published to the readers of that moment; without readers it costs the read of a counter.
 
 use super::payload::Particle;
-use super::{Capacity, Domain, Peer, Reader, ShmError, Writer};
+use super::{Capacity, Domain, Peer, Reader, ShmError, Writer, folders};
 use crate::engine::Engine;
 use crate::swarm::pace::system_time;
 
@@ -28,6 +28,8 @@ impl Positions {
     /// # Errors
     /// An invalid name, a name in use, or insufficient memory.
     pub fn open(domain: &Domain, name: &str, particles: usize) -> Result<Self, ShmError> {
+        // Its services, and slices for one reader: held, waiting and being filled.
+        folders::require_room((256 << 10) + (4 * particles * size_of::<Particle>()) as u64)?;
         let peer = domain.join("flockform_run")?;
         let writer = Writer::open(&peer, name, POSITIONS, &Capacity::BODY, particles)?;
         Ok(Self { writer, unsent: 0, peer })

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use super::link::Robots;
-use super::{Domain, Peer, ShmError, wait};
+use super::{Domain, Peer, ShmError, folders, room_for_swarm, wait};
 use crate::scene::swarm::Swarm;
 use crate::swarm::control::Control;
 use crate::swarm::flight::Fleet;
@@ -30,6 +30,7 @@ impl SimulatedRobots {
     pub fn open(swarm: &Swarm, domain: &Domain) -> Result<Self, ShmError> {
         let control = Control::new(swarm)?;
         let formation = control.formation();
+        folders::require_room(room_for_swarm(formation.count()))?;
         let peer = domain.join("flockform_robots")?;
         let end = Robots::open(&peer, &swarm.name, formation.count())?;
         Ok(Self {
@@ -74,6 +75,7 @@ impl SimulatedRobots {
         }
         if self.fleet.period().is_multiple_of(CLEANING) {
             self.peer.clean_up();
+            self.end.warn_of_others();
         }
     }
 }

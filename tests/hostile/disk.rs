@@ -42,6 +42,32 @@ fn a_full_disk_is_a_failure_that_every_message_names_and_leaves_nothing_half_wri
 
 #[test]
 #[ignore = "mounts a small disk, which takes user namespaces"]
+fn a_node_whose_recording_a_full_disk_cuts_short_flies_on_and_says_where_it_is() {
+    let node =
+        "ROS_DOMAIN_ID=87 ROS_LOCALHOST_ONLY=1 timeout --preserve-status -s INT 6 \"$flockform\" node square";
+    let said = on_a_small_disk("24k", &format!("{node} --record flight.mcap; echo \"code $?\"; ls -A"));
+    assert!(said.contains("code 1") && said.contains("the recording ends early"), "{said}");
+    assert!(said.contains("is in flight.mcap.part") && !said.contains("nothing is kept"), "{said}");
+    assert!(said.ends_with("code 1\nflight.mcap.part\n"), "{said}");
+}
+
+#[test]
+#[ignore = "mounts a small disk, which takes user namespaces"]
+fn shared_memory_that_is_full_is_refused_before_anything_is_in_it() {
+    for subcommand in ["node", "robots"] {
+        let mount = "mount -t tmpfs -o size=64k tmpfs /dev/shm";
+        let said = on_a_small_disk(
+            "64k",
+            &format!(
+                "{mount}; \"$flockform\" {subcommand} square --transport shm; echo \"code $?\"; ls -A /dev/shm"
+            ),
+        );
+        assert!(said.ends_with("code 2\n") && said.contains("/dev/shm has 65 kB free"), "{said}");
+    }
+}
+
+#[test]
+#[ignore = "mounts a small disk, which takes user namespaces"]
 fn whatever_a_full_disk_takes_nothing_of_is_a_failure() {
     for command in [
         "new scene other --from cook",

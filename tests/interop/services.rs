@@ -190,7 +190,7 @@ fn an_emergency_stop_holds_everybody_whatever_else_is_asked_until_it_is_lifted()
 #[test]
 #[ignore = "needs the cyclonedds package of PyPI: see the head of tests/interop/main.rs"]
 fn the_formation_is_set_by_name_and_by_numbers_and_nonsense_is_refused() {
-    let mut asked = Asked::open(&SHORT);
+    let mut asked = Asked::open(&[SHORT[0], "limits.speed=20.0"]);
     let control = asked.square.control();
     let formation = control.formation();
     let turned = formation.affine(formation.programs_end()).expect("a manoeuvre");

@@ -110,6 +110,31 @@ fn a_formation_that_the_limits_cannot_fly_is_refused() {
     set_formation(&mut control, &SetFormationRequest { duration, ..asked }).expect("flyable");
 }
 
+#[test]
+fn a_manoeuvre_of_the_file_is_begun_only_where_it_can_be_flown() {
+    let far =
+        "manoeuvres[0].legs=[{ seconds = 5.0, hold = 1.0 }, { seconds = 100.0, translate = [15.0, 0.0] }]";
+    let fast = "manoeuvres[0].legs=[{ seconds = 5.0 }, { seconds = 1.0, translate = [5.0, 0.0] }]";
+    let fenced = "limits.geofence=[[-5.0, -5.0], [20.0, -5.0], [20.0, 20.0], [-5.0, 20.0]]";
+    for (overrides, says) in
+        [(&[far, fenced][..], "geofence"), (&[fast], "its legs would have to take at least 4")]
+    {
+        let mut control = Control::new(&square(overrides)).expect("valid");
+        let name = control.formation().manoeuvres[0].name.clone();
+        let refused =
+            set_formation(&mut control, &SetFormationRequest { name, ..moved() }).expect_err("not flyable");
+        assert!(refused.contains(says), "{refused}");
+    }
+    let mut control = Control::new(&square(&[far])).expect("valid");
+    let name = control.formation().manoeuvres[0].name.clone();
+    let request = SetFormationRequest { name, ..moved() };
+    set_formation(&mut control, &request).expect("without a fence");
+    let limits = flockform::swarm::safety::Limits { speed: 0.1, ..control.limits().clone() };
+    control.set_limits(limits).expect("a limit");
+    let refused = set_formation(&mut control, &request).expect_err("the limit is lower now");
+    assert!(refused.contains("the limits are 0.1"), "{refused}");
+}
+
 fn moved() -> SetFormationRequest {
     SetFormationRequest { stretch: [1.0; 2], ..SetFormationRequest::default() }
 }
@@ -182,6 +207,19 @@ fn commands_of_the_program_around_a_node_are_those_of_peers() {
         assert!(second.is_err_and(|words| words.contains("another transition") || words.contains(allowed)));
         let state = serde_json::to_value(swarm.node.kept()).expect("JSON")["state"].clone();
         assert_eq!(state, if allowed == "stop-only" { "inactive" } else { "active" });
+        if allowed != "all" {
+            continue;
+        }
+        send.send((9, NodeCommand::ChangeState("shutdown"))).expect("room");
+        swarm.tick();
+        let named = SetFormationRequest { name: "move".to_owned(), ..moved() };
+        for command in [NodeCommand::EmergencyStop, NodeCommand::Resume, NodeCommand::SetFormation(named)] {
+            answered.try_iter().for_each(drop);
+            send.send((10, command.clone())).expect("room");
+            swarm.tick();
+            let refused = answered.try_recv().expect("answered").1.expect_err("it flies no more");
+            assert!(refused.contains("finalized"), "{command:?}: {refused}");
+        }
     }
 }
 

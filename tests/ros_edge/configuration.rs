@@ -127,6 +127,33 @@ fn a_recording_with_a_cleanup_in_it_replays_to_the_bit() {
     assert!(report.robots.iter().all(|robot| robot.recorded > 30), "{:?}", report.robots);
 }
 
+#[test]
+fn a_recording_of_a_process_that_goes_on_where_another_ended_replays_to_the_bit() {
+    let _peers = peers();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("flight.2.mcap");
+    let legs = "manoeuvres[0].legs=[{ seconds = 20.0, translate = [2.0, 0.5] }]";
+    let file = square(&[&PATIENT[..], &[legs]].concat());
+    let mut swarm = Swarming::open(&file, &[]);
+    swarm.until_all_are_heard();
+    swarm.fly_until("the leaders are under way", |swarm| swarm.node.control().program_time() > 0.3);
+    let kept = swarm.node.kept();
+    drop(swarm);
+    let taken_over = Some(kept.control().clone());
+    let about = About { source: "node", taken_over, ..About::default() };
+    let recording = Shared::new(Recording::create(&path, &about, false).expect("writable"));
+    let mut swarm = Swarming::open(&file, &[]);
+    swarm.node.record(recording.sink()).expect("named");
+    swarm.node.restore(kept);
+    swarm.until_all_are_heard();
+    swarm.fly_until("the leaders go on", |swarm| swarm.node.control().program_time() > 0.6);
+    drop(swarm);
+    recording.take().expect("open").finish().expect("whole");
+    let report = replay_file(&path, Some(file), &[], 0.0).expect("readable");
+    assert!(report.holds(), "{:?}", report.robots);
+    assert!(report.robots.iter().all(|robot| robot.recorded > 20), "{:?}", report.robots);
+}
+
 /// Words of the refusal of a topic with two uses.
 fn refusal(overrides: &[&str], more: &[&str]) -> String {
     let file = square(&[&PATIENT[..], overrides].concat());

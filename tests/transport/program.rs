@@ -6,8 +6,9 @@ use std::process::{Command, Stdio};
 use flockform::flock::vectors::distance;
 use flockform::scene::swarm::Swarm;
 use flockform::shm::channel::{Capacity, Reader, Slice, Writer};
+use flockform::shm::link::POSES;
 use flockform::shm::node::{COMMANDS, MEMBERS, STATE};
-use flockform::shm::payload::{Command as Order, Formation, Member};
+use flockform::shm::payload::{Command as Order, Formation, Member, Pose};
 use flockform::shm::{FormationNode, SimulatedRobots};
 use flockform::swarm::flight::Flight;
 use flockform::swarm::watch::Health;
@@ -101,6 +102,25 @@ fn start_with(domain: &str, subcommand: &str, log: Stdio) -> Running {
     command.env(flockform::shm::domain::VARIABLE, domain).stdin(Stdio::null()).stderr(log);
     command.env_remove("RUST_LOG");
     Running(command.spawn().expect("it starts"))
+}
+
+#[test]
+fn a_second_node_and_robots_of_another_number_are_said() {
+    let name = domain_name();
+    let mut running = start_with(&name, "node", Stdio::piped());
+    let lines = BufReader::new(running.0.stderr.take().expect("piped")).lines();
+    let mut lines = lines.map(|line| line.expect("text"));
+    let mut line = |words: &str| lines.find(|line| line.contains(words)).expect("a line");
+    line("25 robots at");
+    let peer = domain(&name).join("test").expect("shared memory");
+    let mut poses = Writer::<Pose>::open(&peer, "square", POSES, &Capacity::SWARM, 1).expect("a writer");
+    let stranger = Pose { member: 25, frame: 0, position: [0.0; 2], yaw: 0.0, stamp: 0.0 };
+    poses.send(0.0, 0, 1, |_| stranger).expect("sent");
+    line("a pose is of robot 25, and the swarm has 25");
+    let second = start(&name, "node");
+    line("another node moves the same robots");
+    drop(second);
+    assert_eq!(running.terminate(), Some(0));
 }
 
 fn next(reader: &Reader<Member>, what: &str, is: impl Fn(&Slice<Member>) -> bool) {

@@ -6,6 +6,7 @@ use crate::flock::manoeuvre::{Affine, Demand, Leg, Manoeuvre, Posture};
 use crate::flock::vectors::distance;
 use crate::messages::flockform_msgs::{LoopEvent, SetFormationRequest};
 use crate::messages::said;
+use crate::scene::text::{decimals, number};
 use crate::swarm::control::Control;
 
 /// A request that was granted, for a recorder.
@@ -34,8 +35,10 @@ pub fn set_formation(control: &mut Control, request: &SetFormationRequest) -> Re
                 control.formation().manoeuvres.iter().map(|manoeuvre| manoeuvre.name.as_str()).collect();
             format!("there is no manoeuvre `{}`; there are: {}", said(&request.name), known.join(", "))
         })?;
+        // What the file's own leaders fly is planned with cautions; it is not checked here.
+        check_flyable(control, &manoeuvre, "its legs would have to take")?;
         control.begin(&manoeuvre);
-        return Ok(format!("manoeuvre `{}`, {} s", request.name, manoeuvre.duration()));
+        return Ok(format!("manoeuvre `{}`, {} s", request.name, number(manoeuvre.duration())));
     }
     let SetFormationRequest { translate, rotate, stretch, shear, duration, .. } = *request;
     let numbers = [translate[0], translate[1], rotate, stretch[0], stretch[1], shear[0], shear[1], duration];
@@ -43,7 +46,7 @@ pub fn set_formation(control: &mut Control, request: &SetFormationRequest) -> Re
         return Err("a number is not finite".into());
     }
     if duration <= 0.0 {
-        return Err(format!("duration = {duration} s: give a positive one"));
+        return Err(format!("duration = {} s: give a positive one", number(duration)));
     }
     if stretch[0] * stretch[1] == shear[0] * shear[1] {
         return Err("stretch and shear would collapse the formation onto one line or point".into());
@@ -53,21 +56,21 @@ pub fn set_formation(control: &mut Control, request: &SetFormationRequest) -> Re
     let from = control.formation().posture(about, time);
     let leg = Leg { seconds: duration, hold: 0.0, posture };
     let manoeuvre = Manoeuvre { about, from, legs: vec![leg] };
-    check_flyable(control, &manoeuvre)?;
+    check_flyable(control, &manoeuvre, "give a duration of")?;
     control.begin(&manoeuvre);
-    Ok(format!("under way for {duration} s"))
+    Ok(format!("under way for {} s", number(duration)))
 }
 
-/// Moments of a manoeuvre whose places are looked at.
+/// Moments of a leg whose places are looked at.
 const LOOKS: u32 = 64;
 
 /// Angle between two looks at a turn \[rad\].
 const PART: f64 = 0.1;
 
-/// Where the formation comes in a manoeuvre of one leg. Between two moments it may turn far, past what it passes at
+/// Where the formation comes in a leg that begins so late \[s\]. Between two moments it may turn far, past what it passes at
 /// neither; of several rounds one is looked at.
-fn passed(manoeuvre: &Manoeuvre) -> Vec<Affine> {
-    let posture = |k: u32| manoeuvre.posture(manoeuvre.duration() * f64::from(k) / f64::from(LOOKS));
+fn passed(manoeuvre: &Manoeuvre, leg: &Leg, begun: f64) -> Vec<Affine> {
+    let posture = |k: u32| manoeuvre.posture(begun + leg.seconds * f64::from(k) / f64::from(LOOKS));
     let between = |k: u32| {
         let (here, next) = (posture(k), posture((k + 1).min(LOOKS)));
         let turn = (next.rotate - here.rotate).clamp(-TAU, TAU);
@@ -81,16 +84,21 @@ fn passed(manoeuvre: &Manoeuvre) -> Vec<Affine> {
 
 /// Refuses a manoeuvre that no robot within the limits can follow, or that leads out of the range of accepted poses:
 /// the filter would hold the robots back while the leaders' program goes on without them.
-fn check_flyable(control: &Control, manoeuvre: &Manoeuvre) -> Result<(), String> {
+fn check_flyable(control: &Control, manoeuvre: &Manoeuvre, remedy: &str) -> Result<(), String> {
     let (limits, formation, watch) = (control.limits(), control.formation(), control.watch().limits());
-    let maps = passed(manoeuvre);
+    let mut begun = 0.0;
+    let mut maps = Vec::new();
+    for leg in &manoeuvre.legs {
+        maps.extend(passed(manoeuvre, leg, begun));
+        begun += leg.seconds + leg.hold;
+    }
     for (place, &radius) in formation.places.iter().zip(&formation.radii) {
         for there in maps.iter().map(|map| map.apply(place)) {
             let away = distance(there, watch.centre);
             if away.is_nan() || away > watch.range {
                 return Err(format!(
                     "it leads {away:.3e} m from the centre: poses.range allows {} m",
-                    watch.range
+                    number(watch.range)
                 ));
             }
             if !control.filter().is_fenced_in(there, radius) {
@@ -106,11 +114,12 @@ fn check_flyable(control: &Control, manoeuvre: &Manoeuvre) -> Result<(), String>
     // To rounding.
     if slower > 1.0 + 1e-6 {
         return Err(format!(
-            "it asks for {speed:.3} m/s and {acceleration:.3} m/s^2, the limits are {} and {}: give a duration of \
-             at least {:.2} s",
+            "it asks for {} m/s and {} m/s^2, the limits are {} and {}: {remedy} at least {} s",
+            decimals(speed, 3),
+            decimals(acceleration, 3),
             limits.speed,
             limits.acceleration,
-            manoeuvre.duration() * slower + 0.005
+            decimals(manoeuvre.duration() * slower + 0.005, 2)
         ));
     }
     Ok(())
@@ -120,6 +129,24 @@ fn check_flyable(control: &Control, manoeuvre: &Manoeuvre) -> Result<(), String>
 mod tests {
     use super::*;
     use crate::scene::bundled::bundled_swarm;
+
+    #[test]
+    fn manoeuvres_of_the_bundled_swarms_can_be_asked_for_where_a_robot_can_fly_them() {
+        for one in crate::scene::bundled::SWARMS {
+            let swarm = one.load_swarm(&[]).expect("loads");
+            let control = Control::new(&swarm).expect("laid out");
+            for manoeuvre in
+                control.formation().manoeuvres.iter().filter(|_| control.formation().is_led_here())
+            {
+                let request =
+                    SetFormationRequest { name: manoeuvre.name.clone(), ..SetFormationRequest::default() };
+                let begun = set_formation(&mut control.clone(), &request);
+                // There the leaders' targets change places at once.
+                let is_step = one.name == "antipodal";
+                assert_eq!(begun.is_err(), is_step, "{}, {}: {begun:?}", one.name, manoeuvre.name);
+            }
+        }
+    }
 
     #[test]
     fn a_turn_of_many_rounds_is_refused_for_what_it_is_between_the_looks() {

@@ -165,7 +165,8 @@ impl Graph {
         for name in ours.iter().filter(|name| !known.contains(name)) {
             tracing::error!(
                 "another node is called {name}: both take its commands and both move its robots; end one of them, or \
-                 give it another name (-r __node:=NAME) or namespace"
+                 give it robots of its own in another namespace (-r __ns:=/NAME): under another name alone it would move \
+                 these robots all the same"
             );
         }
         match ours.is_empty() {

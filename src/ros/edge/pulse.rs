@@ -155,7 +155,10 @@ impl Pulse {
                 *heard = None;
                 tracing::info!("all peers have left: waiting for others");
             } else if !self.given_up.swap(true, Ordering::Relaxed) {
-                tracing::error!("the middleware is given up: all peers that were heard before are silent");
+                tracing::error!(
+                    "no peer that was heard before is heard: the middleware is given up, in case it is deaf to them; \
+                     those that were switched off come back by themselves"
+                );
             }
         }
     }

@@ -42,6 +42,8 @@ pub(super) struct Commanded<'a> {
     pub control: &'a mut Control,
     pub allowed: RawCommands,
     pub is_configured: bool,
+    /// Whether the node has been shut down, which is for good.
+    pub is_finalized: bool,
     /// Commands that were done.
     pub events: Vec<Event>,
 }
@@ -55,6 +57,9 @@ impl Commanded<'_> {
         };
         if !may {
             return Err(not_allowed(self.allowed));
+        }
+        if self.is_finalized && !matches!(command, NodeCommand::ChangeState(_)) {
+            return Err("the node is finalized, and moves no robot: start it again".to_owned());
         }
         match command {
             NodeCommand::EmergencyStop => {

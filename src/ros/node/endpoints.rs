@@ -1,7 +1,5 @@
 //! The topics of a configured node: the lifecycle's `configure` opens them, `cleanup` closes them.
 
-use std::time::{Duration, Instant};
-
 use super::drive::Drive;
 use super::link::Link;
 use super::origin::Origin;
@@ -13,9 +11,7 @@ use crate::messages::std_msgs::Header;
 use crate::messages::visualization_msgs::MarkerArray;
 use crate::ros::edge::{Publisher, Quality};
 use crate::swarm::control::Control;
-
-/// Time without any pose after which the log says so.
-const PATIENCE: Duration = Duration::from_secs(5);
+use crate::swarm::transport::silence::Silence;
 
 /// Poses in; targets, velocities, state and markers out.
 pub(super) struct Endpoints {
@@ -25,8 +21,7 @@ pub(super) struct Endpoints {
     is_driving: bool,
     state: Publisher<FormationState>,
     markers: Option<Publisher<MarkerArray>>,
-    /// When they were opened; none once the log has said that no pose has come since.
-    opened: Option<Instant>,
+    silence: Silence,
     /// Of their topic, which a recording has in any case.
     markers_name: String,
 }
@@ -48,28 +43,21 @@ impl Endpoints {
             link,
             drives,
             is_driving: false,
-            opened: Some(Instant::now()),
+            silence: Silence::default(),
             state: node.publisher(&names.topic("~/state")?, Quality::reliable(5))?,
             markers: raw.markers.then(|| node.publisher(&markers_name, Quality::reliable(1))).transpose()?,
             markers_name,
         })
     }
 
-    /// Warns once where no pose has come for some seconds since the topics were opened.
+    /// Warns where robots are not heard for some seconds.
     pub fn warn_of_silence(&mut self, control: &Control, origin: &Origin) {
-        if self.opened.is_none_or(|opened| opened.elapsed() < PATIENCE) {
-            return;
-        }
-        self.opened = None;
-        let counts = |m: usize| control.watch().counts(m);
-        let has_come = |&m: &usize| counts(m).accepted + counts(m).rejected() > 0;
-        if !origin.part.heard.iter().any(has_come) {
-            let topic = origin.first_pose_topic();
-            tracing::warn!(
-                "no pose has come for {} s, on {topic} or any other topic of poses: no robot is sent a target before",
-                PATIENCE.as_secs()
-            );
-        }
+        let topic = |of: &[usize]| match of {
+            [one] => origin.pose_topic(*one),
+            [first, ..] => format!("{} or any other topic of poses", origin.pose_topic(*first)),
+            [] => "any topic of poses".to_owned(),
+        };
+        self.silence.look(control, &origin.part.heard, &topic);
     }
 
     /// Velocities towards the targets of an active node; of one that ceases to be, zero once: from then on the robots

@@ -20,6 +20,13 @@ pub struct NodeSnapshot {
     names: Vec<(String, String)>,
 }
 
+impl NodeSnapshot {
+    /// The part of it that is the loop's.
+    pub fn control(&self) -> &ControlSnapshot {
+        &self.control
+    }
+}
+
 impl FormationNode {
     /// The state for [`FormationNode::restore`].
     pub fn kept(&self) -> NodeSnapshot {

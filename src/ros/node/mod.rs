@@ -24,7 +24,7 @@ use std::time::Instant;
 use super::arguments::{NameError, Names, RosArguments};
 use super::edge::clock::Clock;
 use super::edge::descriptions::TypeDescriptions;
-use super::edge::lifecycle::{Lifecycle, Transition};
+use super::edge::lifecycle::{Lifecycle, State, Transition};
 use super::edge::loggers::{LogLevel, Loggers};
 use super::edge::parameters::{Change, Parameters};
 use super::edge::pulse::Pulse;
@@ -424,9 +424,13 @@ impl FormationNode {
         self.descriptions.iter().for_each(TypeDescriptions::serve);
         let changes = self.parameters.poll(now, locked);
         self.apply(&changes, now);
-        let is_configured = self.endpoints.is_some();
-        let mut commanded =
-            Commanded { control: &mut self.control, allowed, is_configured, events: Vec::new() };
+        let mut commanded = Commanded {
+            control: &mut self.control,
+            allowed,
+            is_configured: self.endpoints.is_some(),
+            is_finalized: self.lifecycle.state() == State::Finalized,
+            events: Vec::new(),
+        };
         if self.stop_requests.as_ref().is_some_and(|requests| requests.take_last().is_some()) {
             tracing::warn!("emergency stop by topic");
             let _ = commanded.perform(&NodeCommand::EmergencyStop);

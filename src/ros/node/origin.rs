@@ -100,12 +100,11 @@ impl Origin {
         format!("{} on {}", self.node.name(), self.node.options())
     }
 
-    /// The topic of the poses of the first robot whose poses are received.
-    pub fn first_pose_topic(&self) -> String {
-        let robots = &self.fresh.formation().names;
-        let first = self.part.heard.first().map_or("{name}", |&m| &robots[m]);
+    /// The topic of a robot's poses.
+    pub fn pose_topic(&self, member: usize) -> String {
         // Checked before the topics were opened.
-        self.topic_of(&self.swarm.raw.node.pose_topic, first).unwrap_or_default()
+        self.topic_of(&self.swarm.raw.node.pose_topic, &self.fresh.formation().names[member])
+            .unwrap_or_default()
     }
 
     /// Where its first robot is reached, in words.

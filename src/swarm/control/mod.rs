@@ -57,6 +57,13 @@ pub struct ControlSnapshot {
     places: Vec<[f64; 2]>,
 }
 
+impl ControlSnapshot {
+    /// Periods that the programs have run \[1\].
+    pub fn periods(&self) -> u64 {
+        self.periods
+    }
+}
+
 /// The place that a member is taken to stand at before any pose of it is believed.
 #[derive(Clone, Copy)]
 struct Start {

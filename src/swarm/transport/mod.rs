@@ -11,6 +11,7 @@
 
 pub mod complaints;
 pub mod in_process;
+pub mod silence;
 
 use complaints::Complaints;
 
@@ -110,7 +111,12 @@ pub fn listen<E: ControllerEnd>(control: &mut Control, end: &mut E, complaints: 
                 return;
             }
             let name = &control.formation().names[member];
-            match rejection.cause() {
+            let cause = match rejection {
+                // It has waited to be read for no longer than a loop at this rate lets it.
+                Rejection::TooOld { age, .. } if age <= control.period() => None,
+                _ => rejection.cause(),
+            };
+            match cause {
                 Some(cause) => {
                     complaints.warn(cause, member, system_time(), &format_args!("{name}: {rejection}"))
                 }

@@ -36,8 +36,8 @@ pub enum Rejection {
     },
     /// It was measured too long ago.
     #[error(
-        "a pose is {age:.3} s old on arrival, at most {age_limit:.3} s is allowed: synchronise the clocks, \
-         or look for what delays it"
+        "a pose is {age:.3} s old when it is read, at most {age_limit:.3} s is allowed: synchronise the clocks, \
+         or look for what delays it or stops this program"
     )]
     TooOld {
         /// How long ago \[s\].
