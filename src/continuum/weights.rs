@@ -41,7 +41,7 @@ pub fn of_body(
                 (0..body.count()).flat_map(|j| neighbours.of(j).iter().map(move |&k| weight(j, k))).collect();
             let sums = |i: usize| weights[neighbours.bonds(i)].iter().sum::<f64>();
             let is_lost =
-                |&i: &usize| !neighbours.of(i).is_empty() && !(sums(i) > 0.0 && sums(i).is_finite());
+                |&i: &usize| !(neighbours.of(i).is_empty() || (sums(i) > 0.0 && sums(i).is_finite()));
             if let Some(i) = body.exact().find(is_lost) {
                 let message =
                     format!("the weights of the neighbours of particle {} add up to {}", body.id(i), sums(i));

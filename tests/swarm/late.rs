@@ -73,11 +73,12 @@ fn robots_of_any_pace_keep_clear_behind_late_poses_and_commands() {
             controls.iter_mut().for_each(|control| control.tick(now));
             sent.push((0..ROBOTS).map(|k| controls[k.min(controls.len() - 1)].target(k)).collect());
             let mut next = poses[tick].clone();
-            for k in 0..ROBOTS {
+            let due = tick.checked_sub(late).map_or(vec![None; ROBOTS], |then| sent[then].clone());
+            for (k, target) in due.into_iter().enumerate() {
                 // Of each ten periods one stands in one, another in the next one.
                 let stands = (tick / 10) % ROBOTS == k;
                 let pace: f64 = if stands { 0.0 } else { random.random_range(0.3..1.0) };
-                let Some(target) = tick.checked_sub(late).and_then(|then| sent[then][k]) else { continue };
+                let Some(target) = target else { continue };
                 let here = next.get(k);
                 let way = distance(here, target);
                 let share = if way > 0.0 { (pace * PERIOD / way).min(1.0) } else { 0.0 };

@@ -97,7 +97,7 @@ mod tests {
         assert_eq!((at(&control, 0), at(&control, 4)), (None, None));
         assert!(at(&control, 5).is_some_and(|text| text.starts_with("no pose has come for 5 s, on pose/0:")));
         assert_eq!(at(&control, 60), None, "once");
-        let mut hear = |control: &mut Control, member: usize| {
+        let hear = |control: &mut Control, member: usize| {
             let position = control.formation().places.get(member);
             let pose = Pose { position, yaw: 0.0, stamp: 1.0, frame_is_right: true };
             control.receive(member, pose, 1.0).expect("believed");
