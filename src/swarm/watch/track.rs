@@ -141,7 +141,7 @@ impl Track {
 
     /// Notes the target \[m\] that holds from `now` \[s\] on; `None` where the robot is to come to rest.
     pub fn send(&mut self, now: f64, target: Option<[f64; 2]>) {
-        // Before the first one it goes where it was sent by whoever sent it before, if anybody did.
+        // Before the first one it may be on its way to where another loop sent it.
         if target.is_none() && self.sent.back().is_none_or(|(_, last)| last.is_none()) {
             return;
         }
