@@ -49,9 +49,11 @@ pub(crate) fn solve_turning(
     {
         return Ok(found);
     }
-    let (mut at, mut done, mut stride) = (at_rest, 0.0, 1.0);
+    // In one stride an end that comes back has not moved.
+    let longest = if led.is_some() { 1.0 / f64::from(LOOKS) } else { 1.0 };
+    let (mut at, mut done, mut stride) = (at_rest, 0.0, longest);
     while done < 1.0 {
-        let part = f64::min(done + stride, 1.0);
+        let part = f64::min(done + stride.min(longest), 1.0);
         match way.part(at.clone(), part)? {
             Some(found) => (at, done, stride) = (found, part, 2.0 * stride),
             None if stride < 2.0 * LEAST_STRIDE => return Err(FemError::Lost { part: done }),
