@@ -211,11 +211,10 @@ impl Filter {
     ) -> [f64; 2] {
         let (here, last) = (seen.present.get(member), self.sent.get(member));
         let ahead = self.ahead(seen, member);
-        let is_elsewhere = match self.limits.arrives {
-            true => seen.known[member] && (ahead > 0.0 || self.is_inexact(seen, period, member)),
-            // One that has not come so far is given its way from where it is seen.
-            false => ahead > 0.0 && distance(here, last) <= self.limits.speed * (period + ahead),
-        };
+        // One that has not come so far, or was carried away, is given its way from where it is seen.
+        let goes_on = ahead > 0.0 && distance(here, last) <= self.limits.speed * (period + ahead);
+        let has_arrived = self.limits.arrives && seen.known[member] && self.is_inexact(seen, period, member);
+        let is_elsewhere = goes_on || has_arrived;
         if !is_elsewhere || !last.iter().all(|x| x.is_finite()) {
             return target;
         }
