@@ -108,3 +108,30 @@ fn swarms_with_late_poses_fly_as_others_do() {
         assert!(largest < most && last < 1e-6, "{swarm}: {largest} m, {last} m");
     }
 }
+
+#[test]
+fn a_robot_that_was_carried_away_is_led_from_where_it_is() {
+    const AGE: f64 = 0.03;
+    let mut control = loops(&circle("ideal\""), false).remove(0);
+    let mut places: Vec<[f64; 2]> = control.formation().places.iter().collect();
+    assert!(control.place_leader(0, [0.0, 0.0]));
+    for tick in 0..20 {
+        let now = f64::from(tick) * PERIOD;
+        if tick == 15 {
+            places[0][1] += 0.45;
+        }
+        for (k, &position) in places.iter().enumerate() {
+            let pose = Pose { position, yaw: 0.0, stamp: now - AGE, frame_is_right: true };
+            control.receive(k, pose, now).expect("a pose");
+        }
+        control.tick(now);
+        let target = control.target(0).expect("it is heard");
+        assert!(
+            distance(target, places[0]) < PERIOD + AGE + 1e-9,
+            "period {tick}: {target:?} from {places:?}"
+        );
+        // At its target after a period.
+        places[0] = target;
+    }
+    assert!(places[0][0] < 1.0, "it went on: {places:?}");
+}
