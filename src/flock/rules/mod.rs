@@ -154,7 +154,7 @@ impl Rule {
         neighbours: impl Iterator<Item = Neighbour> + Clone,
     ) -> [f64; 2] {
         if let Mean::Power { exponent, origin } = self.mean {
-            return self.target_by_axes(*own, power::mean(exponent, origin, neighbours));
+            return self.target_by_axes(*own, exponent, origin, neighbours);
         }
         match self.mean(own.present, neighbours) {
             Some(mean) => self.completed(own, mean),
@@ -162,8 +162,16 @@ impl Rule {
         }
     }
 
-    /// A coordinate without a mean stays.
-    fn target_by_axes(&self, mut own: ParticleState, means: [Option<f64>; 2]) -> [f64; 2] {
+    /// The same by the power mean; a coordinate without one stays. Out of the way of means that take less.
+    #[inline(never)]
+    fn target_by_axes(
+        &self,
+        mut own: ParticleState,
+        exponent: f64,
+        origin: Origin,
+        neighbours: impl Iterator<Item = Neighbour> + Clone,
+    ) -> [f64; 2] {
+        let means = power::mean(exponent, origin, neighbours);
         let mean = [0, 1].map(|k| means[k].unwrap_or(own.present[k]));
         own.rest = [0, 1].map(|k| if means[k].is_some() { own.rest[k] } else { 0.0 });
         let target = self.completed(&own, mean);

@@ -152,7 +152,7 @@ impl FlightReport {
             ("Largest acceleration", self.acceleration.as_ref().map(|one| one.words(&number))),
             ("Way", Some(way)),
             ("Robots lost", (self.most_lost > 0).then(|| format!("{} at one time", self.most_lost))),
-            ("Never heard", first_few(self.never_heard.iter())),
+            ("Never heard", first_few(self.never_heard.iter().map(|name| format!("`{name}`")))),
         ];
         facts.into_iter().filter_map(|(name, value)| Some((name, value?))).collect()
     }

@@ -55,13 +55,12 @@ impl Formation {
 
     /// Names of the members that are picked, the first few of them; none where none is.
     pub fn named(&self, is_picked: impl Fn(usize) -> bool) -> Option<String> {
-        first_few((0..self.count()).filter(|&m| is_picked(m)).map(|m| &self.names[m]))
+        first_few((0..self.count()).filter(|&m| is_picked(m)).map(|m| format!("`{}`", self.names[m])))
     }
 }
 
 /// The first few of these names and how many there are besides; none where there is no name.
-pub fn first_few<'a>(names: impl Iterator<Item = &'a String>) -> Option<String> {
-    let mut names = names.map(|name| format!("`{name}`"));
+pub fn first_few(mut names: impl Iterator<Item = String>) -> Option<String> {
     let shown = names.by_ref().take(MOST_NAMED).collect::<Vec<_>>().join(", ");
     match names.count() {
         _ if shown.is_empty() => None,

@@ -161,17 +161,20 @@ impl Filter {
             // Two at the very same place part: the lower number to the left.
             let aside = if member < other { [1.0, 0.0] } else { [-1.0, 0.0] };
             let there = seen.present.get(other);
-            let ways = [member, other].map(|m| &self.crowd.ways[m]);
-            let border = Border { ways, places: places(seen, other), keep, stray, reach };
+            let border = || {
+                let ways = [member, other].map(|m| &self.crowd.ways[m]);
+                Border { ways, places: places(seen, other), keep, stray, reach }
+            };
             let are_between = || [member, other].iter().all(|&m| !places(seen, m).is_empty());
             let is_added = if brakes {
-                let takes_ways = !ways.iter().all(|ways| ways.is_point());
+                let border = border();
+                let takes_ways = !border.ways.iter().all(|ways| ways.is_point());
                 if takes_ways {
                     border.add(&mut self.cell.planes);
                 }
                 takes_ways
             } else {
-                stray > 0.0 && are_between() && border.add_between(member < other, &mut self.cell.planes)
+                stray > 0.0 && are_between() && border().add_between(member < other, &mut self.cell.planes)
             };
             if !is_added {
                 add_border(&mut self.cell.planes, [here, there, aside], keep, stray, reach);

@@ -3,11 +3,10 @@
 use std::time::{Duration, Instant};
 
 use crate::swarm::control::Control;
+use crate::swarm::formation::first_few;
 
 /// Time without a pose after which the log says so.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// Robots that a line names; of more it says how many.
-const NAMED: usize = 5;
 
 /// The robots of which no pose has been believed yet.
 #[derive(Clone, Debug, Default)]
@@ -59,18 +58,9 @@ impl Silence {
             (true, false) => (self.missing.clone(), "the swarm flies without"),
             (_, true) => (followers, "the swarm flies without"),
         };
-        let of = names(control, &robots);
+        let names = &control.formation().names;
+        let of = first_few(robots.iter().map(|&m| names[m].clone()))?;
         Some(format!("no pose of {of} has been believed for {seconds} s, on {}: {what}", topic(&robots)))
-    }
-}
-
-/// The first of these robots by name, and how many more there are.
-fn names(control: &Control, robots: &[usize]) -> String {
-    let names = &control.formation().names;
-    let named: Vec<&str> = robots.iter().take(NAMED).map(|&m| names[m].as_str()).collect();
-    match robots.len() - named.len() {
-        0 => named.join(", "),
-        more => format!("{} and {more} more", named.join(", ")),
     }
 }
 
