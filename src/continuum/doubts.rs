@@ -1,5 +1,6 @@
-//! Means and thresholds that do not suit the body.
+//! Means and thresholds that do not suit the body, and roles without effect.
 
+use super::layout;
 use crate::engine::Engine;
 use crate::engine::setup::Setup;
 use crate::flock::body::Body;
@@ -69,12 +70,15 @@ fn sees(flock: &Flock, from: usize, other: usize) -> bool {
 }
 
 /// The warnings before a run.
-pub(crate) fn planned(scene: &Scene, Setup { body, flock, roles, .. }: &Setup) -> Vec<String> {
+pub(crate) fn planned(scene: &Scene, setup: &Setup) -> Vec<String> {
+    let Setup { body, flock, roles, changes, .. } = setup;
     // A part does not see the others.
     if body.part.is_some() {
         return Vec::new();
     }
-    Doubts::of(body, flock, roles, &body.reference).cautions(scene)
+    let mut cautions = Doubts::of(body, flock, roles, &body.reference).cautions(scene);
+    cautions.extend(layout::roles::cautions(changes, body.count()));
+    cautions
 }
 
 /// The warnings after a run, made by all ranks together where each has a part of the body.

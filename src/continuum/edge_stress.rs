@@ -108,7 +108,8 @@ impl<'a> Patches<'a> {
         if own.any(|other| other != region) {
             return Err(LeftOut::Interface);
         }
-        let near = |p: [f64; 2]| distance(p, point) < REACH * self.spacing;
+        // Along rows, middles of sides stand at just this distance: rounding is not to say which count.
+        let near = |p: [f64; 2]| distance(p, point) < REACH * self.spacing * (1.0 - 1e-9);
         let buckets = || around(self.bucket(point));
         let all: Vec<u32> = buckets()
             .filter_map(|b| self.cells_in.get(&b))

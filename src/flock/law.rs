@@ -403,7 +403,7 @@ impl Flock {
 
     /// The coordinates of which there is no mean for `particle` when all stand at `present`.
     pub(crate) fn lacks_mean(&self, particle: usize, present: &Vectors) -> [bool; 2] {
-        self.rule.lacks_mean(self.seen(particle, present))
+        self.rule.lacks_mean(present.get(particle), self.seen(particle, present))
     }
 
     fn seen<'a>(

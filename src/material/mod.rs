@@ -23,7 +23,7 @@
 //! * [`cells`]: the cells of a body: rectangles, triangles or hexagons between its particles.
 //! * [`boundary`]: the sides along the edge of the cells, and the outline that they make.
 //! * [`fit`]: bodies whose outline is kept: cells that the shape cuts, along it.
-//! * [`stiffness`]: what one cell resists: bilinear quadrilateral, constant-strain triangle, and the
+//! * [`stiffness`]: what one cell resists: bilinear rectangle, parallelogram of assumed stress, constant-strain triangle, and the
 //!   lowest-order virtual element for any polygon.
 //! * [`dilatation`]: near nu = 1/2, the mean over the cells around a particle in place of each cell's own.
 //! * [`mechanism`]: whether the cells hold the body together, or a hinge lets it fold.

@@ -10,6 +10,8 @@
 //!
 //! The fields balance no body force: the caller takes a stress that balances it off cells and tractions beforehand.
 
+use std::f64::consts::SQRT_2;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::elastic::Elastic;
@@ -121,10 +123,12 @@ pub fn stress_at(
     let relative = |p: [f64; 2]| [0, 1].map(|k| (p[k] - point[k]) / reach);
     for (k, cell) in cells.iter().enumerate() {
         let weight = (cell.area / mean_area).sqrt();
+        // The square of a tensor has its shear twice: weighed otherwise, the fit would depend on how the axes are turned.
+        let weight = [weight, weight, weight * SQRT_2];
         for (column, stress) in fields.at(relative(cell.centroid)).into_iter().enumerate() {
-            (0..3).for_each(|c| matrix[(3 * k + c, column)] = weight * stress[c]);
+            (0..3).for_each(|c| matrix[(3 * k + c, column)] = weight[c] * stress[c]);
         }
-        (0..3).for_each(|c| right[3 * k + c] = weight * cell.stress[c]);
+        (0..3).for_each(|c| right[3 * k + c] = weight[c] * cell.stress[c]);
     }
     for (k, known) in tractions.iter().enumerate() {
         let (row, [nx, ny], [dx, dy]) = (3 * cells.len() + k, known.normal, known.direction);

@@ -300,12 +300,29 @@ fn components_that_would_be_held_later_or_not_at_all_are_refused_by_name() {
     let cases = [
         ([left.clone(), role("right", "clamped", "axis = \"y\"\nfrom = 100")], "roles[1].axis"),
         ([left.clone(), role("right", "follower", "axis = \"y\"")], "roles[1].axis"),
-        ([role("left", "clamped", ""), left.clone()], "roles[1].axis = \"x\": is without effect: roles[0]"),
+        ([role("left", "clamped", ""), left.clone()], "roles[1].axis = \"x\": is without effect: roles[0] holds"),
     ];
     for (roles, words) in cases {
         let (folder, said) = run(&[bar, &roles.concat(), PULL], &["--figures", "none"], 2);
         assert!(said.contains(words), "no `{words}` in\n{said}");
         assert!(!folder.path().join("o").exists(), "{words}");
+    }
+}
+
+#[test]
+fn a_component_of_particles_that_are_held_altogether_is_led_nowhere_and_that_is_said() {
+    let (bar, _) = BAR.split_once("[[roles]]").expect("has a clamp");
+    let clamped = "[[roles]]\nregion = { kind = \"edge\", side = \"left\" }\nrole = \"clamped\"\n";
+    let below = |role: &str| {
+        format!("[[roles]]\nregion = {{ kind = \"edge\", side = \"bottom\" }}\naxis = \"y\"\n{role}\n")
+    };
+    let led = below(
+        "role = \"leader\"\nmotion = { kind = \"keyframes\", frames = [{ step = 1, displacement = [0.0, 0.01] }] }",
+    );
+    let words = "but 1 of these stay as roles[0] has them";
+    for (roller, is_said) in [(led, true), (below("role = \"clamped\""), false)] {
+        let (_, said) = run(&[bar, clamped, &roller, PULL], &["--figures", "none"], 0);
+        assert_eq!(said.contains(words), is_said, "{said}");
     }
 }
 

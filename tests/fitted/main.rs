@@ -6,6 +6,7 @@ mod convergence;
 #[path = "../common/folders.rs"]
 mod folders;
 mod inclusions;
+mod invariance;
 mod iterations;
 mod locking;
 mod outlines;

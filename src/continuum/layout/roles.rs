@@ -70,24 +70,49 @@ impl Layout {
     }
 }
 
-/// Refuses single components of particles all of which an entry above holds altogether: nothing would be left of them.
-fn require_free_components(scene: &Scene, changes: &[RoleChange], count: usize) -> Result<(), SceneError> {
+/// The entries that hold or lead one component from the start, by number, and of each of their particles the entry above
+/// that holds it altogether.
+fn covered(changes: &[RoleChange], count: usize) -> Vec<(usize, Vec<Option<usize>>)> {
     let mut holder = vec![None; count];
+    let mut covered = Vec::new();
     for (k, change) in changes.iter().enumerate().filter(|(_, change)| change.is_at_once()) {
-        if change.axis.is_none() {
+        if change.axis.is_some() {
+            covered.push((k, change.particles.iter().map(|&i| holder[i]).collect()));
+        } else {
             let holds = change.role != Role::Follower;
             change.particles.iter().for_each(|&i| holder[i] = holds.then_some(k));
-            continue;
         }
-        let held = change.particles.iter().map(|&i| holder[i]).collect::<Option<Vec<usize>>>();
-        if let Some(first) = held.and_then(|by| by.first().copied()) {
-            let message =
-                format!("is without effect: roles[{first}] and others above hold these particles altogether");
+    }
+    covered
+}
+
+/// Refuses single components of particles all of which an entry above holds altogether: nothing would be left of them.
+fn require_free_components(scene: &Scene, changes: &[RoleChange], count: usize) -> Result<(), SceneError> {
+    for (k, held) in covered(changes, count) {
+        let held: Option<Vec<usize>> = held.into_iter().collect();
+        if let Some([first, others @ ..]) = held.as_deref() {
+            let hold = if others.iter().all(|by| by == first) { "holds" } else { "and others above hold" };
+            let message = format!("is without effect: roles[{first}] {hold} these particles altogether");
             let help = "leave it out, or take its particles out of the other region";
             return Err(scene.refuse(&format!("roles[{k}].axis"), message, help));
         }
     }
     Ok(())
+}
+
+/// A warning for each entry that leads one component of particles some of which an entry above holds altogether.
+pub fn cautions(changes: &[RoleChange], count: usize) -> Vec<String> {
+    let leads = |(k, _): &(usize, Vec<Option<usize>>)| changes[*k].role == Role::Leader;
+    let caution = |(k, held): (usize, Vec<Option<usize>>)| {
+        let first = held.iter().flatten().next()?;
+        let stay = held.iter().flatten().count();
+        Some(format!(
+            "roles[{k}] leads one component of {} particles, but {stay} of these stay as roles[{first}] has them, which holds them \
+             altogether; take them out of its region to have them led",
+            held.len()
+        ))
+    };
+    covered(changes, count).into_iter().filter(leads).filter_map(caution).collect()
 }
 
 /// Displacement \[length\] of each particle that does not follow, at `step`; `None` for followers and for leaders

@@ -153,39 +153,16 @@ impl Rule {
         own: &ParticleState,
         neighbours: impl Iterator<Item = Neighbour> + Clone,
     ) -> [f64; 2] {
-        if let Mean::Power { exponent, origin } = self.mean {
-            return self.target_by_axes(*own, exponent, origin, neighbours);
-        }
-        match self.mean(own.present, neighbours) {
-            Some(mean) => self.completed(own, mean),
-            None => own.present,
-        }
+        self.completed(own, self.means(own.present, neighbours))
     }
 
-    /// The same by the power mean; a coordinate without one stays. Out of the way of means that take less.
-    #[inline(never)]
-    fn target_by_axes(
+    /// The coordinates of which these neighbours of a particle at `present` have no mean.
+    pub(crate) fn lacks_mean(
         &self,
-        mut own: ParticleState,
-        exponent: f64,
-        origin: Origin,
+        present: [f64; 2],
         neighbours: impl Iterator<Item = Neighbour> + Clone,
-    ) -> [f64; 2] {
-        let means = power::mean(exponent, origin, neighbours);
-        let mean = [0, 1].map(|k| means[k].unwrap_or(own.present[k]));
-        own.rest = [0, 1].map(|k| if means[k].is_some() { own.rest[k] } else { 0.0 });
-        let target = self.completed(&own, mean);
-        [0, 1].map(|k| if means[k].is_some() { target[k] } else { own.present[k] })
-    }
-
-    /// The coordinates of which these neighbours have no mean.
-    pub(crate) fn lacks_mean(&self, neighbours: impl Iterator<Item = Neighbour> + Clone) -> [bool; 2] {
-        match self.mean {
-            Mean::Power { exponent, origin } => {
-                power::mean(exponent, origin, neighbours).map(|mean| mean.is_none())
-            }
-            _ => [false; 2],
-        }
+    ) -> [bool; 2] {
+        self.means(present, neighbours).map(|mean| mean.is_none())
     }
 
     /// The same as [`Rule::target`] for a material of small rotations, which needs only pairs of weight and
@@ -196,10 +173,7 @@ impl Rule {
         own: &ParticleState,
         pairs: impl Iterator<Item = (Block, [f64; 2])>,
     ) -> [f64; 2] {
-        match material::mean(pairs) {
-            Some(mean) => self.completed(own, mean),
-            None => own.present,
-        }
+        self.completed(own, by_axis(material::mean(pairs)))
     }
 
     /// The target by a corotated material: where the force of the cells around the particle and its load leave it, its
@@ -218,15 +192,20 @@ impl Rule {
         }
     }
 
-    /// The target from the bare mean: rest offset, load and terms added.
+    /// The target from the bare means: rest offset, load and terms added. A coordinate without a mean stays.
     #[inline]
-    fn completed(&self, own: &ParticleState, mean: [f64; 2]) -> [f64; 2] {
-        let mut target = [mean[0] + own.rest[0], mean[1] + own.rest[1]];
+    fn completed(&self, own: &ParticleState, means: [Option<f64>; 2]) -> [f64; 2] {
+        let stays = means.map(|mean| mean.is_none());
+        if stays == [true; 2] {
+            return own.present;
+        }
+        let mut target = [0, 1].map(|k| means[k].map_or(own.present[k], |mean| mean + own.rest[k]));
         if let Some(Load { force, compliance }) = &own.load {
             let push = apply(compliance, *force);
             target = [target[0] + push[0], target[1] + push[1]];
         }
-        self.with_terms(own, target)
+        let target = self.with_terms(own, target);
+        [0, 1].map(|k| if stays[k] { own.present[k] } else { target[k] })
     }
 
     #[inline]
@@ -240,24 +219,21 @@ impl Rule {
         target
     }
 
-    /// The bare mean, before any term; `None` without neighbours or without any weight.
+    /// The bare mean of each coordinate, before any term; `None` without neighbours or without any weight.
     #[inline]
-    fn mean(
+    fn means(
         &self,
         present: [f64; 2],
         neighbours: impl Iterator<Item = Neighbour> + Clone,
-    ) -> Option<[f64; 2]> {
-        match self.mean {
+    ) -> [Option<f64>; 2] {
+        by_axis(match self.mean {
+            Mean::Power { exponent, origin } => return power::means(exponent, origin, neighbours),
             Mean::Barycentre => barycentre::mean(neighbours),
             Mean::Distance { power } => distance::mean(power, present, neighbours),
-            Mean::Power { exponent, origin } => {
-                let means = power::mean(exponent, origin, neighbours);
-                (means != [None; 2]).then(|| [0, 1].map(|k| means[k].unwrap_or(present[k])))
-            }
             Mean::Median => median::mean(neighbours),
             Mean::Spaced { spacing, power } => spaced::mean(spacing, power, present, neighbours),
             Mean::Material { .. } => material::mean(neighbours.map(|n| (n.matrix, n.position))),
-        }
+        })
     }
 
     /// The offset that makes a particle with these neighbours stay at `reference`: reference minus
@@ -272,9 +248,15 @@ impl Rule {
         reference: [f64; 2],
         neighbours: impl Iterator<Item = Neighbour> + Clone,
     ) -> [f64; 2] {
-        let Some(mean) = self.mean(reference, neighbours) else { return [0.0; 2] };
-        [0, 1].map(|k| exact_difference(reference[k], mean[k]))
+        let means = self.means(reference, neighbours);
+        [0, 1].map(|k| means[k].map_or(0.0, |mean| exact_difference(reference[k], mean)))
     }
+}
+
+/// A mean that has all coordinates or none.
+#[inline]
+fn by_axis(mean: Option<[f64; 2]>) -> [Option<f64>; 2] {
+    mean.map_or([None; 2], |mean| mean.map(Some))
 }
 
 /// The number nearest to `sum - part` for which `part + it` rounds to `sum` exactly, where there is

@@ -23,7 +23,7 @@ pub enum Origin {
 }
 
 /// Power mean of each coordinate; `None` for one that has none, without neighbours and without any weight.
-pub fn mean(
+pub fn means(
     exponent: f64,
     origin: Origin,
     neighbours: impl Iterator<Item = Neighbour> + Clone,
@@ -82,13 +82,13 @@ mod tests {
 
     #[test]
     fn the_literal_geometric_mean_of_two_and_eight_is_four() {
-        let x = mean(0.0, Origin::World, at(&[[2.0, 1.0], [8.0, 1.0]]))[0].expect("positive coordinates");
+        let x = means(0.0, Origin::World, at(&[[2.0, 1.0], [8.0, 1.0]]))[0].expect("positive coordinates");
         assert!((x - 4.0).abs() < 1e-14);
     }
 
     #[test]
     fn the_quadratic_mean_of_one_and_seven_is_five() {
-        let x = mean(2.0, Origin::World, at(&[[1.0, 1.0], [7.0, 1.0]]))[0].expect("positive coordinates");
+        let x = means(2.0, Origin::World, at(&[[1.0, 1.0], [7.0, 1.0]]))[0].expect("positive coordinates");
         assert!((x - 5.0).abs() < 1e-14);
     }
 
@@ -98,7 +98,7 @@ mod tests {
         let moved = here.map(|[x, y]| [x + 64.0, y + 32.0]);
         for exponent in [0.0, 2.0, -1.0] {
             let shift = |origin| {
-                let (a, b) = (mean(exponent, origin, at(&here)), mean(exponent, origin, at(&moved)));
+                let (a, b) = (means(exponent, origin, at(&here)), means(exponent, origin, at(&moved)));
                 b[0].expect("positive") - a[0].expect("positive")
             };
             assert!((shift(Origin::Moving { margin: 1.0 }) - 64.0).abs() < 1e-13);
@@ -108,11 +108,11 @@ mod tests {
 
     #[test]
     fn a_negative_coordinate_has_no_literal_mean_and_zero_has_its_limit() {
-        let of = |exponent, x| mean(exponent, Origin::World, at(&[[x, 1.0], [8.0, 1.0]]));
+        let of = |exponent, x| means(exponent, Origin::World, at(&[[x, 1.0], [8.0, 1.0]]));
         assert_eq!(of(0.0, -1.0), [None, Some(1.0)]);
         assert_eq!([of(0.0, 0.0), of(-2.0, 0.0)], [[Some(0.0), Some(1.0)]; 2]);
         assert_eq!(of(1.0, 0.0), [Some(4.0), Some(1.0)]);
-        assert_eq!(mean(1.0, Origin::World, at(&[[0.0, 0.0]])), [Some(0.0); 2]);
+        assert_eq!(means(1.0, Origin::World, at(&[[0.0, 0.0]])), [Some(0.0); 2]);
     }
 
     #[test]
@@ -129,7 +129,7 @@ mod tests {
         ] {
             for origin in [Origin::World, Origin::Moving { margin: 1.0 }] {
                 let all = [[1.0, 1.0], [2.0, 2.0], [2.0, 2.0], [3.0, 3.0]];
-                let x = mean(exponent, origin, at(&all))[0].expect("positive coordinates");
+                let x = means(exponent, origin, at(&all))[0].expect("positive coordinates");
                 assert!((x - expected).abs() < 1e-12, "{exponent}: {x}");
             }
         }

@@ -26,9 +26,8 @@ pub fn require_wide(outline: &Partition, near: &NearPieces, spacing: f64) -> Res
     for (ring, number, piece) in outline.pieces() {
         let count = (2.0 * piece.length() / spacing).ceil().clamp(1.0, 1e8) as usize;
         // Pieces that meet at a corner are as narrow as the corner is sharp.
-        let ends = [0.0, 1.0].map(|t| piece.point(t));
-        let is_end = |p: [f64; 2]| ends.iter().any(|end| distance(*end, p) < ROUNDING * spacing);
-        let is_beside = |other: &Piece| is_end(other.from) || is_end(other.to);
+        let ends = ends(outline.ring(ring), piece, ROUNDING * spacing);
+        let is_beside = |other: &Piece| touches(&ends, other, ROUNDING * spacing);
         let sides: &[f64] = if outline.is_bounding(ring) { &[-1.0] } else { &[-1.0, 1.0] };
         for t in (0..count).map(|k| (k as f64 + 0.5) / count as f64) {
             let (place, normal) = (piece.point(t), piece.normal(t));
@@ -36,7 +35,8 @@ pub fn require_wide(outline: &Partition, near: &NearPieces, spacing: f64) -> Res
                 for [other_ring, other] in near.around(place, across) {
                     let is_same = [other_ring, other] == [ring, number];
                     let other = outline.piece(other_ring, other);
-                    if if is_same { piece.arc.is_none() } else { is_beside(other) } {
+                    let is_round = are_of_one_circle(piece, other, ROUNDING * spacing);
+                    if !is_round && (is_same || is_beside(other)) {
                         continue;
                     }
                     let opposite = meetings(place, across, other).into_iter().map(|[s, _]| s);
@@ -50,4 +50,24 @@ pub fn require_wide(outline: &Partition, near: &NearPieces, spacing: f64) -> Res
         }
     }
     Ok(())
+}
+
+/// Ends of a piece and, on both sides of it, of those that go on along its circle.
+fn ends(ring: &[Piece], piece: &Piece, near: f64) -> Vec<[f64; 2]> {
+    let mut ends = vec![piece.from, piece.to];
+    let mut others: Vec<&Piece> = ring.iter().filter(|other| are_of_one_circle(piece, other, near)).collect();
+    while let Some(next) = others.iter().position(|other| touches(&ends, other, near)) {
+        let next = others.swap_remove(next);
+        ends.extend([next.from, next.to]);
+    }
+    ends
+}
+
+fn touches(ends: &[[f64; 2]], other: &Piece, near: f64) -> bool {
+    ends.iter().any(|&end| distance(end, other.from) < near || distance(end, other.to) < near)
+}
+
+fn are_of_one_circle(a: &Piece, b: &Piece, near: f64) -> bool {
+    let (Some(a), Some(b)) = (a.arc, b.arc) else { return false };
+    distance(a.centre, b.centre) < near && (a.radius - b.radius).abs() < near
 }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use super::near::stretches;
-use super::{FitError, SNAP, STAYS, Scale, is_kept_corner};
+use super::{FitError, ROUNDING, SNAP, STAYS, Scale, is_kept_corner};
 use crate::flock::lattice::{Lattice, Site};
 use crate::flock::vectors::distance;
 use crate::flock::window::Window;
@@ -271,7 +271,7 @@ impl Sites {
                         distances.push(apart);
                         let was = self.inside.has(site);
                         bounds.push(Bound { place: None, apart: f64::INFINITY, was });
-                    } else if apart < distances[known] {
+                    } else if apart < distances[known] * (1.0 - ROUNDING) {
                         (self.near[known].state, distances[known]) = (state, apart);
                     }
                     let bound = &mut bounds[known];
@@ -295,8 +295,9 @@ impl Sites {
             let near = near
                 .map(|number| (distance(lattice.position(self.near[number as usize].site), corner), number));
             // No two sites are within the snapping distance of one point.
-            if let Some((apart, number)) = near.reduce(|a, b| if b.0 < a.0 { b } else { a })
-                && apart <= snap
+            if let Some((apart, number)) =
+                near.reduce(|a, b| if b.0 < a.0 * (1.0 - ROUNDING) { b } else { a })
+                && apart <= snap * (1.0 + ROUNDING)
             {
                 let one = &mut self.near[number as usize];
                 let home = lattice.position(one.site);
@@ -315,7 +316,7 @@ impl Sites {
             let State::On { place, .. } = one.state else { continue };
             let (home, target) = (lattice.position(one.site), outline.point(place));
             let apart = distance(target, home);
-            if apart <= snap {
+            if apart <= snap * (1.0 + ROUNDING) {
                 let moved = apart > STAYS * scale.spacing;
                 one.state = State::On { place, moved };
                 one.point = if moved { target } else { home };

@@ -13,6 +13,14 @@ const ROUNDS: usize = 4;
 /// A side that shrinks may change the area of what is around it by this part: its chord cuts an arc shorter.
 const AREA_CHANGE: f64 = 0.02;
 
+/// Parts by which sizes differ that are equal but for rounding: it is not to decide what becomes of the cells.
+const EQUAL: f64 = 1e-9;
+
+/// A size in such parts of another.
+fn parts(size: f64, of: f64) -> i64 {
+    (size / of / EQUAL).round() as i64
+}
+
 pub fn tidy(faces: &mut Faces, scale: &Scale) {
     for _ in 0..ROUNDS {
         let merged = merge(faces, scale);
@@ -74,16 +82,18 @@ fn merge(faces: &mut Faces, scale: &Scale) -> usize {
         });
     }
     let is_fine = |faces: &Faces, corners: &[u32]| {
-        area(faces, corners) >= least && width(faces, corners) >= narrow && !is_dart(faces, corners)
+        area(faces, corners) >= least * (1.0 - EQUAL)
+            && width(faces, corners) >= narrow * (1.0 - EQUAL)
+            && !is_dart(faces, corners)
     };
-    let mut small: Vec<(f64, usize)> = (0..faces.faces.len())
+    let mut small: Vec<(i64, usize)> = (0..faces.faces.len())
         .filter(|&face| {
             let corners = &faces.faces[face].corners;
             !corners.is_empty() && !is_fine(faces, corners)
         })
-        .map(|face| (area(faces, &faces.faces[face].corners), face))
+        .map(|face| (parts(area(faces, &faces.faces[face].corners), scale.area), face))
         .collect();
-    small.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    small.sort_unstable();
     let mut merged = 0;
     for (_, face) in small {
         let Face { corners, region, .. } = &faces.faces[face];
@@ -98,7 +108,8 @@ fn merge(faces: &mut Faces, scale: &Scale) -> usize {
             let joined = join(corners, &faces.faces[other].corners)?;
             is_simple(faces, &joined).then(|| (compactness(faces, &joined), other, joined))
         });
-        if let Some((_, other, joined)) = joined.reduce(|a, b| if b.0 > a.0 { b } else { a }) {
+        if let Some((_, other, joined)) = joined.reduce(|a, b| if b.0 > a.0 * (1.0 + EQUAL) { b } else { a })
+        {
             for number in [face, other] {
                 ways(&faces.faces[number].corners).for_each(|way| {
                     owner.remove(&way);
@@ -185,14 +196,14 @@ fn shrink(faces: &mut Faces, least: f64) -> usize {
     let length = |faces: &Faces, [a, b]: [u32; 2]| {
         distance(faces.nodes[a as usize].point, faces.nodes[b as usize].point)
     };
-    let mut short: Vec<(f64, [u32; 2])> = sides
+    let mut short: Vec<(i64, [u32; 2])> = sides
         .into_iter()
         // Any other side with cells on both sides joins two strands of the outline, or a particle inside with it.
         .filter(|(side, cells)| *cells == 1 || faces.interfaces.contains(side))
-        .map(|(side, _)| (length(faces, side), side))
-        .filter(|(length, _)| *length < least)
+        .filter(|(side, _)| length(faces, *side) < least * (1.0 - EQUAL))
+        .map(|(side, _)| (parts(length(faces, side), least), side))
         .collect();
-    short.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    short.sort_unstable();
     let mut shrunk = 0;
     for (_, [a, b]) in short {
         let rank = |node: u32| {

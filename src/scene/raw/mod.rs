@@ -67,8 +67,8 @@ pub struct RawScene {
     #[serde(default)]
     pub update: RawUpdate,
     /// Roles of the particles, and from when. Each entry takes its particles at its step, whatever has taken them before; at the
-    /// same step the later entry wins, and one with a condition takes none that a later entry has taken before. Particles
-    /// that no entry names are followers.
+    /// same step the later entry wins, though one with `axis` leaves alone what an earlier one holds altogether, and one with a
+    /// condition takes none that a later entry has taken before. Particles that no entry names are followers.
     #[serde(default)]
     pub roles: Vec<RawRoles>,
     /// Bonds break where this is given.
