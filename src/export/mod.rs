@@ -93,7 +93,6 @@ use crate::continuum::mechanics::Stresses;
 use crate::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use crate::continuum::run::Outcome;
 use crate::engine::Engine;
-use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
 use crate::scene::Scene;
 use crate::scene::units::Units;
@@ -261,10 +260,7 @@ fn figures_of<'a>(results: &'a Results<'_>, subject: &'a Subject<'_>, units: &'a
         figures.push((name("pe1"), Box::new(move || figures::pe1(subject, snapshot))));
         if let Some(cells) = outcome.engine.cells() {
             // Each figure has stresses of its own while it is drawn, and none before or after.
-            let displacement = move || -> Vectors {
-                let moved = |(now, then): ([f64; 2], [f64; 2])| [now[0] - then[0], now[1] - then[1]];
-                snapshot.positions.iter().zip(subject.body.reference.iter()).map(moved).collect()
-            };
+            let displacement = move || figures::displacement(subject, snapshot);
             let unit = units.stress.as_str();
             let von_mises = move || {
                 let found = Stresses::of(&outcome.engine, snapshot.step, &displacement(), &snapshot.broken);
