@@ -88,6 +88,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 use rayon::prelude::*;
+#[cfg(any(feature = "bench", feature = "fem"))]
+use serde::Serialize;
 
 use crate::continuum::mechanics::Stresses;
 use crate::continuum::record::{LoadStep, ProbeSeries, Snapshot};
@@ -190,6 +192,21 @@ fn write_others(
     if drawing.formats != Formats::None {
         written.extend(draw_all(folder, results, drawing)?);
     }
+    Ok(written)
+}
+
+/// Writes a benchmark or a study: `NAME.csv` with its rows, the figure `NAME` and, last, `NAME.json` with all of it.
+#[cfg(any(feature = "bench", feature = "fem"))]
+fn write_study(
+    folder: &OutputFolder,
+    name: &str,
+    rows: impl Iterator<Item = impl Serialize>,
+    figure: &str,
+    report: &impl Serialize,
+) -> Result<Vec<PathBuf>, ExportError> {
+    let mut written = vec![csv::write(folder, &format!("{name}.csv"), rows)?];
+    written.extend(figures::write(figure, folder, name)?);
+    written.push(summary::write_signed(folder, &format!("{name}.json"), report)?);
     Ok(written)
 }
 
