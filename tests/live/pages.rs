@@ -56,6 +56,12 @@ impl Viewer {
         Some(Self { socket, frame: Vec::new() })
     }
 
+    /// The first of a program in this folder.
+    pub fn of(folder: &Path) -> Self {
+        let (host, token) = address(folder);
+        within(PATIENCE, "a viewer is let in", || Self::enter(&host, &token))
+    }
+
     pub fn ask(&mut self, command: &Value) {
         self.socket.send(Message::text(command.to_string())).expect("sent");
     }
