@@ -11,6 +11,7 @@ use tungstenite::client::ClientRequestBuilder;
 use tungstenite::{Message, WebSocket};
 
 use super::running::Running;
+use super::served::parts;
 use super::strangers::PATIENCE;
 use super::waits::within;
 
@@ -32,10 +33,7 @@ pub fn address(folder: &Path) -> (String, String) {
             .split_once('\n')
             .map(|(line, _)| line.to_owned())
     };
-    let line = within(PATIENCE, "an address", line);
-    let rest = line.strip_prefix("http://").expect("an address");
-    let (host, token) = rest.split_once("/?token=").expect("with a token");
-    (host.to_owned(), token.to_owned())
+    parts(&within(PATIENCE, "an address", line))
 }
 
 /// A page without a browser.
