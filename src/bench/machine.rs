@@ -66,6 +66,20 @@ pub(super) fn time_triad(a: &mut [f64], b: &[f64], c: &[f64]) -> f64 {
     begin.elapsed().as_secs_f64()
 }
 
+/// Seconds that each of so many takes that `work` does.
+pub(super) fn seconds_each(count: usize, work: impl FnOnce()) -> f64 {
+    let begin = Instant::now();
+    work();
+    begin.elapsed().as_secs_f64() / count as f64
+}
+
+/// The smallest of the sorted values that so large a share of them does not exceed.
+#[cfg(any(feature = "ros", feature = "shm"))]
+pub(super) fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    let rank = (share * sorted.len() as f64).ceil() as usize;
+    sorted.get(rank.saturating_sub(1)).copied()
+}
+
 /// The middle value, or the mean of the two; sorts the values. NaN of none.
 pub(super) fn median(values: &mut [f64]) -> f64 {
     values.sort_unstable_by(f64::total_cmp);

@@ -14,10 +14,9 @@ use flockform::scene::text::counted;
 use flockform::study::compare::run::{Compared, compare as compare_scene};
 use flockform::study::trade::{Chosen, choose};
 
-use super::Refusal;
 use super::progress::Progress;
-use super::run::exit_code;
 use super::study::StudyArguments;
+use super::{Refusal, exit_code};
 
 #[derive(Debug, Args)]
 pub struct CompareArguments {
@@ -57,7 +56,7 @@ pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
         || serde_json::json!(Signed::new(&report)),
         || chosen + &words(&scene, &compared),
     )?;
-    Ok(exit_code(&compared.outcome))
+    Ok(exit_code(compared.outcome.reason.is_good()))
 }
 
 /// How the rule's run ended, and the table.

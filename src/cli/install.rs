@@ -35,16 +35,6 @@ pub enum InstallError {
     OwnProgram(io::Error),
 }
 
-impl InstallError {
-    /// The error of the system that kept a file from being written.
-    pub fn source_of_writing(&self) -> Option<&io::Error> {
-        match self {
-            InstallError::Write { error, .. } => Some(error),
-            InstallError::Foreign { .. } | InstallError::OwnProgram(_) => None,
-        }
-    }
-}
-
 fn list(paths: &[PathBuf]) -> String {
     paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
 }

@@ -20,7 +20,7 @@ use flockform::scene::swarm::Swarm as SwarmFile;
 use flockform::swarm::control::Control;
 use flockform::swarm::flight::{Flight, Sample};
 
-use super::names::{FileName, Kind, Overrides, SceneArguments, folder_of};
+use super::names::{FileName, Kind, Overrides, SceneArguments, folder_in_full, folder_of};
 use super::recording::{self, RecordArguments};
 use super::swarm::{SwarmFileArguments, fly_recorded};
 use super::{Refusal, interrupt, output, print, say};
@@ -155,7 +155,7 @@ impl LiveArguments {
     /// The description of the session for a recording, as of the command that replays it; its swarm file is known at
     /// the end.
     fn about(&self, session: &dyn Session) -> About {
-        let folder = folder_of(&self.file).and_then(|folder| std::path::absolute(folder.join(".")).ok());
+        let folder = folder_in_full(&self.file);
         About { source: session.runner(), name: session.title().0.to_owned(), folder, ..About::default() }
     }
 

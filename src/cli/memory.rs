@@ -19,19 +19,23 @@ struct Room {
 
 /// Bytes that the run of a plan takes at its largest. What this process took until the plan was made, the run takes too.
 pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs) -> usize {
-    /// Code of the program until then, where the system does not say.
-    const CODE: u64 = 16 << 10;
-    let status = read_to_string("/proc/self/status").unwrap_or_default();
-    let kibibytes = |name: &str, otherwise: u64| 1024 * field(&status, name).unwrap_or(otherwise) as usize;
-    let running = flockform::export::memory::predicted(scene, plan, outputs, kibibytes("RssFile:", CODE));
-    running.max(kibibytes("VmHWM:", 0))
+    let running = flockform::export::memory::predicted(scene, plan, outputs, code());
+    running.max(own("VmHWM:").unwrap_or(0) as usize)
 }
 
 /// Bytes that one of so many ranks, with this part of a body, takes at its largest, its tables among them.
 pub fn of_part(scene: &Scene, plan: &Plan, ranks: usize) -> usize {
-    let program =
-        field(&read_to_string("/proc/self/status").unwrap_or_default(), "RssFile:").unwrap_or(16 << 10);
-    flockform::export::memory::of_part(scene, plan, ranks, 1024 * program as usize)
+    flockform::export::memory::of_part(scene, plan, ranks, code())
+}
+
+/// Bytes of the program's code so far; a guess where the system does not say.
+fn code() -> usize {
+    own("RssFile:").unwrap_or(16 << 20) as usize
+}
+
+/// A number of the status of this process \[B\].
+fn own(name: &str) -> Option<u64> {
+    Some(1024 * field(&read_to_string("/proc/self/status").ok()?, name)?)
 }
 
 /// Refuses a scene whose run takes more bytes than there are, so that no kernel has to end it on the way.
@@ -130,8 +134,7 @@ pub fn return_what_is_free() {
 
 /// Memory of this process that is in use \[B\]; 0 where the system does not say.
 pub fn resident() -> u64 {
-    let status = read_to_string("/proc/self/status").unwrap_or_default();
-    1024 * field(&status, "VmRSS:").unwrap_or(0)
+    own("VmRSS:").unwrap_or(0)
 }
 
 /// The least of the machine's, the control groups' and the process's own; `None` where the system says nothing.
@@ -139,11 +142,10 @@ fn room() -> Option<Room> {
     let machine = read_to_string("/proc/meminfo").ok().and_then(|text| field(&text, "MemAvailable:"));
     let machine = machine.map(|kilobytes| Room { bytes: 1024 * kilobytes, bound: "the machine's" });
     let groups = read_to_string("/proc/self/cgroup").ok().and_then(|text| of_groups(&text));
-    let own = read_to_string("/proc/self/limits").ok().and_then(|text| field(&text, "Max address space"));
-    let taken =
-        read_to_string("/proc/self/status").ok().and_then(|text| field(&text, "VmSize:")).unwrap_or(0);
-    let own = own.map(|limit| Room { bytes: limit.saturating_sub(1024 * taken), bound: "`ulimit -v`" });
-    [machine, groups, own].into_iter().flatten().min_by_key(|room| room.bytes)
+    let limit = read_to_string("/proc/self/limits").ok().and_then(|text| field(&text, "Max address space"));
+    let taken = own("VmSize:").unwrap_or(0);
+    let limit = limit.map(|limit| Room { bytes: limit.saturating_sub(taken), bound: "`ulimit -v`" });
+    [machine, groups, limit].into_iter().flatten().min_by_key(|room| room.bytes)
 }
 
 /// The number behind a word of a text, if there is one.

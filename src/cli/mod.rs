@@ -319,8 +319,8 @@ impl Refusal {
             Refusal::Export(ExportError::Io { source, .. } | ExportError::Unmakeable { source, .. })
             | Refusal::Film(FilmError::Io { source, .. })
             | Refusal::Record(RecordError::Io { source, .. })
+            | Refusal::Install(install::InstallError::Write { error: source, .. })
             | Refusal::NewFile { source, .. } => is_full(source),
-            Refusal::Install(error) => error.source_of_writing().is_some_and(is_full),
             Refusal::LiveRecord(_) | Refusal::Print(_) | Refusal::Exhibit { .. } => true,
             Refusal::Export(ExportError::NotMoved { .. }) | Refusal::Record(RecordError::Kept { .. }) => true,
             Refusal::Record(RecordError::Write { .. }) => true,
@@ -427,6 +427,11 @@ fn runs_alone(command: &Command) -> Option<&'static str> {
         Command::List(_) | Command::Show(_) | Command::Plan(_) | Command::Material(_) => None,
         Command::Schema { .. } | Command::Completions { .. } => None,
     }
+}
+
+/// The exit code of what ended well, or failed.
+fn exit_code(is_well: bool) -> ExitCode {
+    if is_well { ExitCode::SUCCESS } else { ExitCode::from(FAILED) }
 }
 
 pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusal> {

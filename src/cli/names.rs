@@ -115,6 +115,11 @@ pub fn folder_of(word: &str) -> Option<PathBuf> {
     Path::new(word).parent().filter(|_| !is_bundled).map(Path::to_owned)
 }
 
+/// The same, wherever the program stands.
+pub fn folder_in_full(word: &str) -> Option<PathBuf> {
+    std::path::absolute(folder_of(word)?.join(".")).ok()
+}
+
 /// The error for a word that is no name of a bundled file of these kinds.
 pub fn not_bundled(kinds: &[Kind], word: &str) -> Refusal {
     let named = |kind: Kind| kind.bundled().iter().map(|one| one.name).collect::<Vec<_>>();

@@ -103,25 +103,10 @@ pub struct Start<'a> {
     is_over: bool,
 }
 
-/// The message of a rank to the others before they begin.
-#[derive(Clone, Copy)]
-enum Word {
-    Ready { program: u64, run: u64 },
-    Refused,
-}
+/// The message of a rank to the others before they begin: whether it is ready, its program, its run.
+type Word = [u64; 3];
 
-impl Word {
-    fn numbers(self) -> [u64; 3] {
-        match self {
-            Word::Ready { program, run } => [1, program, run],
-            Word::Refused => [0; 3],
-        }
-    }
-
-    fn of([is_ready, program, run]: [u64; 3]) -> Self {
-        if is_ready == 1 { Word::Ready { program, run } } else { Word::Refused }
-    }
-}
+const REFUSED: Word = [0; 3];
 
 /// The verdict on all messages; the same on each rank.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -137,11 +122,11 @@ enum Verdict {
 impl Verdict {
     fn of(all: &[Word]) -> Self {
         // A refusal comes before a comparison: the one that refuses has no run.
-        if let Some(rank) = all.iter().position(|word| matches!(word, Word::Refused)) {
+        if let Some(rank) = all.iter().position(|word| *word == REFUSED) {
             return Verdict::Refused(rank);
         }
-        let [_, program, run] = all.first().map_or([0; 3], |first| first.numbers());
-        let wrong = |(rank, word): (usize, &Word)| match word.numbers() {
+        let [_, program, run] = all.first().copied().unwrap_or(REFUSED);
+        let wrong = |(rank, word): (usize, &Word)| match *word {
             [_, other, _] if other != program => Some(Verdict::OtherProgram(rank)),
             [_, _, other] if other != run => Some(Verdict::OtherRun(rank)),
             _ => None,
@@ -157,8 +142,7 @@ impl<'a> Start<'a> {
 
     /// Says a word to the others and hears theirs; anything but a beginning ends all.
     fn exchange(&mut self, team: &Team, own: Word) -> Verdict {
-        let all: Vec<Word> = team.each(own.numbers()).into_iter().map(Word::of).collect();
-        let verdict = Verdict::of(&all);
+        let verdict = Verdict::of(&team.each(own));
         self.is_over = verdict != Verdict::Begin;
         verdict
     }
@@ -166,7 +150,7 @@ impl<'a> Start<'a> {
     /// Waits until all ranks have come this far, with the same run: `run` is the fingerprint of it.
     pub fn agree(&mut self, run: u64) -> Result<(), RanksError> {
         let Some(team) = self.team else { return Ok(()) };
-        let error = match self.exchange(team, Word::Ready { program: program_hash(), run }) {
+        let error = match self.exchange(team, [1, program_hash(), run]) {
             Verdict::Begin => return Ok(()),
             Verdict::Refused(_) => return Err(RanksError::SaidElsewhere),
             Verdict::OtherProgram(rank) => RanksError::OtherProgram { rank },
@@ -187,7 +171,7 @@ impl<'a> Start<'a> {
     pub fn refused(mut self, refusal: Refusal) -> Refusal {
         let Some(team) = self.team.filter(|_| !self.is_over) else { return refusal };
         let rank = team.rank();
-        match self.exchange(team, Word::Refused) {
+        match self.exchange(team, REFUSED) {
             Verdict::Refused(first) if first != rank => RanksError::SaidElsewhere.into(),
             _ if team.is_first() => refusal,
             _ => RanksError::OnRank { rank, refusal: Box::new(refusal) }.into(),
@@ -198,7 +182,7 @@ impl<'a> Start<'a> {
 impl Drop for Start<'_> {
     fn drop(&mut self) {
         if let Some(team) = self.team.filter(|_| !self.is_over && !std::thread::panicking()) {
-            self.exchange(team, Word::Refused);
+            self.exchange(team, REFUSED);
         }
     }
 }
@@ -246,13 +230,11 @@ mod tests {
 
     #[test]
     fn the_first_rank_that_refuses_or_differs_is_named() {
-        let verdict =
-            |all: &[[u64; 3]]| Verdict::of(&all.iter().map(|&word| Word::of(word)).collect::<Vec<_>>());
-        assert_eq!(verdict(&[[1, 2, 3], [1, 2, 3]]), Verdict::Begin);
-        assert_eq!(verdict(&[[1, 2, 3], [1, 2, 3], [1, 2, 4]]), Verdict::OtherRun(2));
-        assert_eq!(verdict(&[[1, 2, 3], [1, 9, 4], [1, 2, 4]]), Verdict::OtherProgram(1));
-        assert_eq!(verdict(&[[1, 2, 3], [1, 9, 3], [0, 0, 0]]), Verdict::Refused(2));
-        assert_eq!(verdict(&[[0, 0, 0], [1, 9, 3]]), Verdict::Refused(0));
+        assert_eq!(Verdict::of(&[[1, 2, 3], [1, 2, 3]]), Verdict::Begin);
+        assert_eq!(Verdict::of(&[[1, 2, 3], [1, 2, 3], [1, 2, 4]]), Verdict::OtherRun(2));
+        assert_eq!(Verdict::of(&[[1, 2, 3], [1, 9, 4], [1, 2, 4]]), Verdict::OtherProgram(1));
+        assert_eq!(Verdict::of(&[[1, 2, 3], [1, 9, 3], REFUSED]), Verdict::Refused(2));
+        assert_eq!(Verdict::of(&[REFUSED, [1, 9, 3]]), Verdict::Refused(0));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use flockform::record::replay::{Report, recorded_swarm, replay as fly_again};
 
 use super::names::Overrides;
 use super::swarm::SwarmFileArguments;
-use super::{FAILED, Refusal, print, say};
+use super::{Refusal, exit_code, print, say};
 
 #[derive(Debug, Args)]
 pub struct ReplayArguments {
@@ -46,7 +46,7 @@ pub fn replay(arguments: &ReplayArguments) -> Result<ExitCode, Refusal> {
     } else {
         say(&words(&report))?;
     }
-    Ok(if report.holds() && report.is_whole() { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })
+    Ok(exit_code(report.holds() && report.is_whole()))
 }
 
 fn words(report: &Report) -> String {

@@ -15,7 +15,7 @@ use flockform::continuum::equilibrium::run_to_equilibrium_shared;
 use flockform::continuum::looks::Looks;
 use flockform::continuum::parts::laid_out_whole_for;
 use flockform::continuum::plan::Plan;
-use flockform::continuum::run::{Outcome, SharedError, StopReason, require_shareable};
+use flockform::continuum::run::{SharedError, StopReason, require_shareable};
 use flockform::continuum::shares::bytes_each;
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
 use flockform::export::film;
@@ -42,7 +42,7 @@ use super::output::{FigureArguments, OutputArguments, ReportArguments, command_l
 use super::progress::Progress;
 use super::ranks::{self, Interrupted, RanksError, Start};
 use super::recording::{RecordArguments, close};
-use super::{FAILED, Refusal, interrupt, memory, on_terminal};
+use super::{FAILED, Refusal, exit_code, interrupt, memory, on_terminal};
 
 #[derive(Debug, Args)]
 #[command(mut_arg("set", |set| set.requires("scene")))]
@@ -310,7 +310,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     if arguments.output.quiet && !is_interrupted && !outcome.reason.is_good() {
         note!("error: {}", on_terminal(&format!("{}: {}", scene.name, outcome.reason)));
     }
-    Ok(if is_whole { exit_code(&outcome) } else { ExitCode::from(FAILED) })
+    Ok(exit_code(is_whole && outcome.reason.is_good()))
 }
 
 impl RunArguments {
@@ -346,7 +346,3 @@ impl RunArguments {
 const QUICKLY_WRITTEN: usize = 50_000;
 /// Stepping that took longer is not lost to an interrupt while figures are drawn.
 const WORTH_KEEPING: Duration = Duration::from_secs(5);
-
-pub fn exit_code(outcome: &Outcome) -> ExitCode {
-    if outcome.reason.is_good() { ExitCode::SUCCESS } else { ExitCode::from(FAILED) }
-}

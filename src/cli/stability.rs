@@ -11,7 +11,7 @@ use flockform::study::stability::study::{Options, run};
 
 use super::progress::Progress;
 use super::study::StudyArguments;
-use super::{FAILED, Refusal};
+use super::{Refusal, exit_code};
 
 #[derive(Debug, Args)]
 pub struct StabilityArguments {
@@ -46,5 +46,5 @@ pub fn stability(arguments: &StabilityArguments) -> Result<ExitCode, Refusal> {
         || json(&study),
         || study.to_string(),
     )?;
-    Ok(if study.holds() { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })
+    Ok(exit_code(study.holds()))
 }

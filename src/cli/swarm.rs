@@ -22,10 +22,10 @@ use flockform::swarm::flight::{Flight, FlightReport, Record, Sample, fly_with_ob
 use flockform::swarm::plan::cautions;
 
 use super::film::{Finish, SwarmFilmArguments};
-use super::names::{FileName, Kind, Overrides, folder_of};
+use super::names::{FileName, Kind, Overrides, folder_in_full};
 use super::output::{OutputArguments, ReportArguments};
 use super::recording::{RecordArguments, close};
-use super::{FAILED, Refusal, interrupt, on_terminal};
+use super::{Refusal, exit_code, interrupt, on_terminal};
 
 /// A swarm and the changes to it.
 #[derive(Debug, Args)]
@@ -57,13 +57,12 @@ impl SwarmFileArguments {
         let bundled = bundled_swarm(&self.swarm);
         let text =
             bundled.map_or_else(|| std::fs::read_to_string(path).ok(), |one| Some(one.text.to_owned()));
-        let folder = folder_of(&self.swarm);
         About {
             source,
             name: swarm.name.clone(),
             swarm: text,
             set: self.overrides.set.clone(),
-            folder: folder.and_then(|folder| std::path::absolute(folder.join(".")).ok()),
+            folder: folder_in_full(&self.swarm),
             ..About::default()
         }
     }
@@ -133,7 +132,7 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     };
     let closing = || words(&report, seconds, &kept) + &recorded;
     let is_whole = finish.done(film, drawn, || serde_json::json!(report), closing)?;
-    Ok(if report.holds() && is_whole { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })
+    Ok(exit_code(report.holds() && is_whole))
 }
 
 /// Flies a swarm that this control is of, and records the messages of its loop.

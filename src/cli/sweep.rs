@@ -21,7 +21,7 @@ use runs::Runs;
 use super::material::wrong;
 use super::names::{FileName, Overrides, SceneArguments, in_full};
 use super::output::{FigureArguments, OutputArguments};
-use super::{FAILED, Refusal, interrupt, print, say};
+use super::{FAILED, Refusal, exit_code, interrupt, print, say};
 
 #[derive(Debug, Args)]
 #[command(mut_arg("set", |set| set.requires("scene")))]
@@ -183,7 +183,7 @@ impl Sweep {
             say(&format!("{name}: {ends}, {seconds:.2} s\nresults in {}\n", kept.display()))?;
         }
         let is_refused = self.rows.values().any(|row| row.stop_reason == runs::REFUSED);
-        Ok(if is_refused { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })
+        Ok(exit_code(!is_refused))
     }
 
     /// `20 runs, all ended at stop.steps`, or `20 runs: 18 ended at stop.steps, 2 diverged`.

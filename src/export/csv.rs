@@ -6,6 +6,7 @@
 //! `stress_yy`, `stress_xy`) are along x and y under small rotations; of a corotated rule in axes that turn with the
 //! material, which were along x and y in the reference configuration. Numbers are the shortest that read back as the same.
 
+use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::ops::Range;
 use std::path::PathBuf;
@@ -289,8 +290,29 @@ pub(super) fn write(
     name: &str,
     rows: impl Iterator<Item = impl Serialize>,
 ) -> Result<PathBuf, ExportError> {
+    write_with(folder, name, |file| write_rows(Writer::from_writer(file), rows))
+}
+
+/// Writes a table whose columns are known only now, under this line of their names.
+pub(super) fn write_below(
+    head: &[impl AsRef<[u8]>],
+    folder: &OutputFolder,
+    name: &str,
+    rows: impl Iterator<Item = impl Serialize>,
+) -> Result<PathBuf, ExportError> {
+    write_with(folder, name, |file| {
+        let mut writer = WriterBuilder::new().has_headers(false).from_writer(file);
+        writer.write_record(head).map_err(io::Error::from)?;
+        write_rows(writer, rows)
+    })
+}
+
+fn write_with(
+    folder: &OutputFolder,
+    name: &str,
+    write: impl FnOnce(File) -> io::Result<()>,
+) -> Result<PathBuf, ExportError> {
     let path = folder.path(name);
-    let write = || write_rows(Writer::from_writer(create(&path)?), rows);
-    write().map_err(ExportError::io("write", &path))?;
+    create(&path).and_then(write).map_err(ExportError::io("write", &path))?;
     Ok(path)
 }

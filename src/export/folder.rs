@@ -370,7 +370,7 @@ fn standing(out: &Path, force: bool) -> Result<Standing, ExportError> {
 }
 
 /// A hidden name in the same parent, hence on the same file system, so that a rename is one step.
-fn beside(out: &Path, what: &str, attempt: u32) -> PathBuf {
+pub(super) fn beside(out: &Path, what: &str, attempt: u32) -> PathBuf {
     let mut name = OsString::from(".");
     name.push(out.file_name().unwrap_or_default());
     name.push(format!(".{what}"));

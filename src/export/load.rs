@@ -16,13 +16,11 @@
 
 use std::path::PathBuf;
 
-use csv::WriterBuilder;
-
 use super::OutputFolder;
+use super::csv::write_below;
 use super::error::ExportError;
 use super::figures::SERIES;
 use super::figures::chart::{Axis, Chart, Series, Style};
-use super::manifest::create;
 use crate::continuum::record::LoadStep;
 use crate::engine::forces::Reaction;
 use crate::engine::path::Work;
@@ -35,17 +33,9 @@ pub(crate) fn write_load(
     scene: &Scene,
     steps: &[LoadStep],
 ) -> Result<PathBuf, ExportError> {
-    let path = folder.path("load.csv");
-    let failed = |error: csv::Error| ExportError::io("write", &path)(error);
-    let file = create(&path).map_err(ExportError::io("write", &path))?;
-    let mut writer = WriterBuilder::new().has_headers(false).from_writer(file);
     let (loads, keys) = (loads(steps), keys(steps));
-    writer.write_record(header(scene, &loads, &keys)).map_err(failed)?;
-    for step in steps {
-        writer.serialize((step.step, row(step, &loads, &keys))).map_err(failed)?;
-    }
-    writer.flush().map_err(ExportError::io("write", &path))?;
-    Ok(path)
+    let rows = steps.iter().map(|step| (step.step, row(step, &loads, &keys)));
+    write_below(&header(scene, &loads, &keys), folder, "load.csv", rows)
 }
 
 /// The entries of `roles` that hold particles in any row, in their order.

@@ -88,12 +88,13 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 use rayon::prelude::*;
+#[cfg(any(feature = "bench", feature = "fem"))]
+use serde::Serialize;
 
 use crate::continuum::mechanics::Stresses;
 use crate::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use crate::continuum::run::Outcome;
 use crate::engine::Engine;
-use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
 use crate::scene::Scene;
 use crate::scene::units::Units;
@@ -194,6 +195,21 @@ fn write_others(
     Ok(written)
 }
 
+/// Writes a benchmark or a study: `NAME.csv` with its rows, the figure `NAME` and, last, `NAME.json` with all of it.
+#[cfg(any(feature = "bench", feature = "fem"))]
+fn write_study(
+    folder: &OutputFolder,
+    name: &str,
+    rows: impl Iterator<Item = impl Serialize>,
+    figure: &str,
+    report: &impl Serialize,
+) -> Result<Vec<PathBuf>, ExportError> {
+    let mut written = vec![csv::write(folder, &format!("{name}.csv"), rows)?];
+    written.extend(figures::write(figure, folder, name)?);
+    written.push(summary::write_signed(folder, &format!("{name}.json"), report)?);
+    Ok(written)
+}
+
 /// The histories of all probed particles, whose indices in the whole body are given, in their order; each rank has those of its
 /// own part, and the first one receives them.
 pub fn probes_of_parts(engine: &Engine, probes: &[usize], team: &Team) -> Vec<ProbeSeries> {
@@ -261,10 +277,7 @@ fn figures_of<'a>(results: &'a Results<'_>, subject: &'a Subject<'_>, units: &'a
         figures.push((name("pe1"), Box::new(move || figures::pe1(subject, snapshot))));
         if let Some(cells) = outcome.engine.cells() {
             // Each figure has stresses of its own while it is drawn, and none before or after.
-            let displacement = move || -> Vectors {
-                let moved = |(now, then): ([f64; 2], [f64; 2])| [now[0] - then[0], now[1] - then[1]];
-                snapshot.positions.iter().zip(subject.body.reference.iter()).map(moved).collect()
-            };
+            let displacement = move || figures::displacement(subject, snapshot);
             let unit = units.stress.as_str();
             let von_mises = move || {
                 let found = Stresses::of(&outcome.engine, snapshot.step, &displacement(), &snapshot.broken);

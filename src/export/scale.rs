@@ -5,18 +5,13 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::OutputFolder;
-use super::csv::write;
 use super::error::ExportError;
+use super::figures::SERIES;
 use super::figures::chart::{Axis, Chart, Series, Style, draw_below_each_other};
-use super::figures::{self, SERIES};
-use super::summary::write_signed;
+use super::{OutputFolder, write_study};
 use crate::bench::scale::large::AtRest;
 use crate::bench::scale::model::Link;
 use crate::bench::scale::{Case, Predicted, Report};
-
-/// The file of a benchmark of ranks, in place of a summary.
-const FILE: &str = "scale.json";
 
 #[derive(Serialize)]
 struct Row {
@@ -38,10 +33,7 @@ struct Row {
 pub fn write_scale(folder: &OutputFolder, report: &Report) -> Result<Vec<PathBuf>, ExportError> {
     let rows = |scaling, cases: &[Case]| cases.iter().map(move |case| row(scaling, *case)).collect();
     let rows: [Vec<Row>; 2] = [rows("strong", &report.strong), rows("weak", &report.weak)];
-    let mut written = vec![write(folder, "scale.csv", rows.into_iter().flatten())?];
-    written.extend(figures::write(&figure(report), folder, "scale")?);
-    written.push(write_signed(folder, FILE, report)?);
-    Ok(written)
+    write_study(folder, "scale", rows.into_iter().flatten(), &figure(report), report)
 }
 
 fn row(scaling: &'static str, case: Case) -> Row {

@@ -5,18 +5,13 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::OutputFolder;
-use super::csv::write;
 use super::error::ExportError;
 use super::figures::chart::{Axis, Chart, Landmark, Series, Style, draw};
-use super::figures::{self, INK, SERIES};
-use super::summary::write_signed;
+use super::figures::{INK, SERIES};
+use super::{OutputFolder, write_study};
 use crate::scene::text::counted;
 use crate::solve::equilibrium::Solver;
 use crate::study::trade::{Outcome, Point, RuleChoice, Study};
-
-/// The file of a trade study, in place of a summary.
-const FILE: &str = "trade.json";
 
 #[derive(Serialize)]
 struct Row<'a> {
@@ -41,10 +36,7 @@ struct Row<'a> {
 pub fn write_trade(folder: &OutputFolder, study: &Study) -> Result<Vec<PathBuf>, ExportError> {
     let front = study.front();
     let rows = study.points.iter().map(|point| row(point, front.contains(&point)));
-    let mut written = vec![write(folder, "trade.csv", rows)?];
-    written.extend(figures::write(&figure(study), folder, "trade")?);
-    written.push(write_signed(folder, FILE, study)?);
-    Ok(written)
+    write_study(folder, "trade", rows, &figure(study), study)
 }
 
 fn row(point: &Point, on_the_front: bool) -> Row<'_> {

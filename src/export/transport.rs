@@ -5,17 +5,12 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::OutputFolder;
-use super::csv::write;
 use super::error::ExportError;
+use super::figures::SERIES;
 use super::figures::chart::{Axis, Chart, Series, Style, draw_below_each_other};
-use super::figures::{self, SERIES};
-use super::summary::write_signed;
+use super::{OutputFolder, write_study};
 use crate::bench::transport::Report;
 use crate::bench::transport::measure::{Case, Work};
-
-/// The file of a benchmark of transports, in place of a summary.
-const FILE: &str = "transport.json";
 
 #[derive(Serialize)]
 struct Row {
@@ -40,10 +35,7 @@ struct Row {
 /// # Errors
 /// The first file that cannot be written.
 pub fn write_transport(folder: &OutputFolder, report: &Report) -> Result<Vec<PathBuf>, ExportError> {
-    let mut written = vec![write(folder, "transport.csv", report.cases.iter().map(row))?];
-    written.extend(figures::write(&figure(report), folder, "transport")?);
-    written.push(write_signed(folder, FILE, report)?);
-    Ok(written)
+    write_study(folder, "transport", report.cases.iter().map(row), &figure(report), report)
 }
 
 fn row(case: &Case) -> Row {

@@ -199,8 +199,7 @@ fn list_of_pieces(step: usize, ranks: usize, has_stresses: bool) -> String {
     let three = |name: &str, more: &str| {
         format!("<PDataArray type=\"Float64\" Name=\"{name}\" NumberOfComponents=\"3\"{more}/>\n")
     };
-    let tensor = " ComponentName0=\"xx\" ComponentName1=\"yy\" ComponentName2=\"xy\"";
-    let of_stresses = [three("stress", tensor), array("Float64", "von_mises")].concat();
+    let of_stresses = [three("stress", PLANE), array("Float64", "von_mises")].concat();
     let stresses = if has_stresses { of_stresses } else { String::new() };
     let points = [
         array("UInt8", GHOSTS),
@@ -209,7 +208,7 @@ fn list_of_pieces(step: usize, ranks: usize, has_stresses: bool) -> String {
         three("displacement", ""),
         array("Float64", "pe1"),
         array("Float64", "pe2"),
-        three("strain", tensor),
+        three("strain", PLANE),
         array("Float64", "rotation"),
         stresses.clone(),
     ];
@@ -245,8 +244,7 @@ fn write_frame(path: &Path, values: &Values<'_>) -> io::Result<()> {
     grid.write_data(&mut out, values)?;
     writeln!(out, "<Points>")?;
     let places = grid.points.clone().map(|row| engine.present().get(engine.body().in_row(row)));
-    let places = places.flat_map(|[x, y]| [x, y, 0.0]);
-    vectors(&mut out, "Points", points, places)?;
+    Arrays { out: &mut out, count: points }.threes("Points", "", places.map(|[x, y]| [x, y, 0.0]))?;
     writeln!(out, "</Points>")?;
     grid.write(&mut out, engine.body())?;
     writeln!(out, "</Piece>\n</UnstructuredGrid>\n</VTKFile>")?;
@@ -307,27 +305,27 @@ impl<'a> Values<'a> {
 
 fn write_point_data(out: &mut impl Write, values: &Values<'_>, rows: &Range<usize>) -> io::Result<()> {
     let engine = values.engine;
-    let (points, body) = (rows.len(), engine.body());
+    let (count, body) = (rows.len(), engine.body());
     let rows = || rows.clone().map(|row| body.in_row(row));
     writeln!(out, "<PointData Scalars=\"pe1\" Vectors=\"displacement\">")?;
+    let mut arrays = Arrays { out: &mut *out, count };
     if body.part.is_some() {
         // Points of other parts, at the ends of bonds that lead there.
-        bytes(out, GHOSTS, points, rows().map(|i| u8::from(!body.owned().contains(&i))))?;
+        arrays.bytes(GHOSTS, rows().map(|i| u8::from(!body.owned().contains(&i))))?;
     }
-    integers(out, "id", points, rows().map(|i| body.id(i) as i64))?;
-    let roles = rows().map(|i| engine.roles()[i].number());
-    bytes(out, "role", points, roles)?;
+    arrays.integers("id", rows().map(|i| body.id(i) as i64))?;
+    arrays.bytes("role", rows().map(|i| engine.roles()[i].number()))?;
     let moved = rows().map(|i| (engine.present().get(i), body.reference.get(i)));
-    let displacement = moved.flat_map(|(now, initial)| [now[0] - initial[0], now[1] - initial[1], 0.0]);
-    vectors(out, "displacement", points, displacement)?;
-    floats(out, "pe1", points, rows().map(|i| values.energies(i)[0]))?;
-    floats(out, "pe2", points, rows().map(|i| values.energies(i)[1]))?;
+    let displacement = moved.map(|(now, initial)| [now[0] - initial[0], now[1] - initial[1], 0.0]);
+    arrays.threes("displacement", "", displacement)?;
+    arrays.floats("pe1", rows().map(|i| values.energies(i)[0]))?;
+    arrays.floats("pe2", rows().map(|i| values.energies(i)[1]))?;
     let particles: Vec<usize> = rows().collect();
     let strains: Vec<[f64; 4]> = particles.into_par_iter().map(|i| values.strain(i)).collect();
-    plane_tensors(out, "strain", points, strains.iter().map(|&[xx, yy, xy, _]| [xx, yy, xy]))?;
-    floats(out, "rotation", points, strains.iter().map(|strain| strain[3]))?;
+    arrays.threes("strain", PLANE, strains.iter().map(|&[xx, yy, xy, _]| [xx, yy, xy]))?;
+    arrays.floats("rotation", strains.iter().map(|strain| strain[3]))?;
     if values.stresses.is_some() {
-        write_stresses(out, points, rows().map(|i| values.stress(i)))?;
+        arrays.stresses(rows().map(|i| values.stress(i)))?;
     }
     writeln!(out, "</PointData>")
 }
@@ -335,15 +333,6 @@ fn write_point_data(out: &mut impl Write, values: &Values<'_>, rows: &Range<usiz
 fn with_von_mises(stress: &StressState) -> [f64; 4] {
     let [xx, yy, xy] = stress.components;
     [xx, yy, xy, stress.von_mises]
-}
-
-fn write_stresses(
-    out: &mut impl Write,
-    count: usize,
-    stresses: impl Iterator<Item = [f64; 4]> + Clone,
-) -> io::Result<()> {
-    plane_tensors(out, "stress", count, stresses.clone().map(|[xx, yy, xy, _]| [xx, yy, xy]))?;
-    floats(out, "von_mises", count, stresses.map(|stress| stress[3]))
 }
 
 /// The points and the cells of the file, in their order.
@@ -390,15 +379,16 @@ impl<'a> Grid<'a> {
         let stretch = |&(_, pair): &(usize, [u32; 2])| {
             length(engine.present(), pair) / length(&engine.body().reference, pair) - 1.0
         };
-        let (cells, polygons) = (self.count(), self.polygons.len());
+        let polygons = self.polygons.len();
         let scalars = if self.bonds.is_empty() && stresses.is_some() { "von_mises" } else { "broken" };
         writeln!(out, "<CellData Scalars=\"{scalars}\">")?;
+        let mut arrays = Arrays { out: &mut *out, count: self.count() };
         let broken = self.bonds.iter().map(|bond| u8::from(is_broken(bond)));
         let vertices = self.vertices.len();
         let (before, after) = (std::iter::repeat_n(0, vertices), std::iter::repeat_n(0, polygons));
-        bytes(out, "broken", cells, before.chain(broken).chain(after))?;
+        arrays.bytes("broken", before.chain(broken).chain(after))?;
         let (before, after) = (std::iter::repeat_n(0.0, vertices), std::iter::repeat_n(0.0, polygons));
-        floats(out, "stretch", cells, before.chain(self.bonds.iter().map(stretch)).chain(after))?;
+        arrays.floats("stretch", before.chain(self.bonds.iter().map(stretch)).chain(after))?;
         if let Some(stresses) = stresses {
             let rows = self.vertices.clone().map(|row| engine.body().in_row(row));
             let particles = rows.map(|i| values.stress(i));
@@ -409,7 +399,7 @@ impl<'a> Grid<'a> {
             let own: Vec<_> =
                 engine.owned_cells().map(|cell| with_von_mises(&stresses.cells[cell])).collect();
             let own = own.into_iter();
-            write_stresses(out, cells, particles.chain(self.bonds.iter().map(between)).chain(own))?;
+            arrays.stresses(particles.chain(self.bonds.iter().map(between)).chain(own))?;
         }
         writeln!(out, "</CellData>")
     }
@@ -425,7 +415,8 @@ impl<'a> Grid<'a> {
         let vertices = self.vertices.len();
         let own = self.vertices.clone().map(|row| row as i64 - first);
         let connected = own.chain(bonds().map(row)).chain(self.polygons().flatten().map(row));
-        integers(out, "connectivity", vertices + 2 * self.bonds.len() + corners, connected)?;
+        Arrays { out: &mut *out, count: vertices + 2 * self.bonds.len() + corners }
+            .integers("connectivity", connected)?;
         let sizes = std::iter::repeat_n(1, vertices)
             .chain(std::iter::repeat_n(2, self.bonds.len()))
             .chain(self.polygons().map(<[u32]>::len));
@@ -433,7 +424,8 @@ impl<'a> Grid<'a> {
             *end += size as i64;
             Some(*end)
         });
-        integers(out, "offsets", self.count(), ends)?;
+        let mut arrays = Arrays { out: &mut *out, count: self.count() };
+        arrays.integers("offsets", ends)?;
         let kind = |cell: &[u32]| match cell.len() {
             3 => TRIANGLE,
             4 => QUADRILATERAL,
@@ -442,53 +434,49 @@ impl<'a> Grid<'a> {
         let types = std::iter::repeat_n(VERTEX, vertices)
             .chain(std::iter::repeat_n(LINE, self.bonds.len()))
             .chain(self.polygons().map(kind));
-        bytes(out, "types", self.count(), types)?;
+        arrays.bytes("types", types)?;
         writeln!(out, "</Cells>")
     }
 }
 
-/// Symmetric tensors in the plane: xx, yy, xy.
-fn plane_tensors(
-    out: &mut impl Write,
-    name: &str,
-    points: usize,
-    tensors: impl Iterator<Item = [f64; 3]>,
-) -> io::Result<()> {
-    let names = "ComponentName0=\"xx\" ComponentName1=\"yy\" ComponentName2=\"xy\"";
-    let attributes = format!("type=\"Float64\" Name=\"{name}\" NumberOfComponents=\"3\" {names}");
-    array(out, &attributes, 3 * points, tensors.flatten().map(f64::to_le_bytes))
-}
+/// What names the components of a symmetric tensor in the plane.
+const PLANE: &str = " ComponentName0=\"xx\" ComponentName1=\"yy\" ComponentName2=\"xy\"";
 
-fn vectors(
-    out: &mut impl Write,
-    name: &str,
-    points: usize,
-    components: impl Iterator<Item = f64>,
-) -> io::Result<()> {
-    let attributes = format!("type=\"Float64\" Name=\"{name}\" NumberOfComponents=\"3\"");
-    array(out, &attributes, 3 * points, components.map(f64::to_le_bytes))
-}
-
-fn floats(
-    out: &mut impl Write,
-    name: &str,
+/// Arrays with a value, or three, for each of so many points or cells.
+struct Arrays<'a, W> {
+    out: &'a mut W,
     count: usize,
-    values: impl Iterator<Item = f64>,
-) -> io::Result<()> {
-    array(out, &format!("type=\"Float64\" Name=\"{name}\""), count, values.map(f64::to_le_bytes))
 }
 
-fn integers(
-    out: &mut impl Write,
-    name: &str,
-    count: usize,
-    values: impl Iterator<Item = i64>,
-) -> io::Result<()> {
-    array(out, &format!("type=\"Int64\" Name=\"{name}\""), count, values.map(i64::to_le_bytes))
-}
+impl<W: Write> Arrays<'_, W> {
+    fn bytes(&mut self, name: &str, values: impl Iterator<Item = u8>) -> io::Result<()> {
+        array(self.out, &format!("type=\"UInt8\" Name=\"{name}\""), self.count, values.map(u8::to_le_bytes))
+    }
 
-fn bytes(out: &mut impl Write, name: &str, count: usize, values: impl Iterator<Item = u8>) -> io::Result<()> {
-    array(out, &format!("type=\"UInt8\" Name=\"{name}\""), count, values.map(u8::to_le_bytes))
+    fn integers(&mut self, name: &str, values: impl Iterator<Item = i64>) -> io::Result<()> {
+        array(self.out, &format!("type=\"Int64\" Name=\"{name}\""), self.count, values.map(i64::to_le_bytes))
+    }
+
+    fn floats(&mut self, name: &str, values: impl Iterator<Item = f64>) -> io::Result<()> {
+        array(
+            self.out,
+            &format!("type=\"Float64\" Name=\"{name}\""),
+            self.count,
+            values.map(f64::to_le_bytes),
+        )
+    }
+
+    /// Vectors, or with [`PLANE`] tensors.
+    fn threes(&mut self, name: &str, more: &str, values: impl Iterator<Item = [f64; 3]>) -> io::Result<()> {
+        let attributes = format!("type=\"Float64\" Name=\"{name}\" NumberOfComponents=\"3\"{more}");
+        array(self.out, &attributes, 3 * self.count, values.flatten().map(f64::to_le_bytes))
+    }
+
+    /// Components and von Mises stress.
+    fn stresses(&mut self, stresses: impl Iterator<Item = [f64; 4]> + Clone) -> io::Result<()> {
+        self.threes("stress", PLANE, stresses.clone().map(|[xx, yy, xy, _]| [xx, yy, xy]))?;
+        self.floats("von_mises", stresses.map(|stress| stress[3]))
+    }
 }
 
 /// One array of `count` values of `SIZE` bytes, after the length that the format asks for.

@@ -152,14 +152,9 @@ impl Session for Monitor {
     fn frame(&self, _wanted: &[bool]) -> Frame {
         let mut clearance = Vec::new();
         self.control.clearance(&mut clearance);
-        let target = |m: usize| self.control.target(m);
-        let mut frame = swarm::frame(
-            &self.control,
-            &self.control.last_places(),
-            &clearance,
-            &target,
-            self.control.program_time(),
-        );
+        let (control, places) = (&self.control, self.control.last_places());
+        let target = |m: usize| control.target(m);
+        let mut frame = swarm::frame(control, &places, &clearance, &target, control.program_time());
         // Poses alone tell no motion.
         frame.channels.extend([None, None]);
         frame

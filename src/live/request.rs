@@ -49,10 +49,7 @@ fn parse(head: &[u8]) -> Option<Asked> {
     request.parse(head).ok().filter(httparse::Status::is_complete)?;
     let value = |name: &str| -> Option<Option<&str>> {
         let mut named = request.headers.iter().filter(|header| header.name.eq_ignore_ascii_case(name));
-        let first = named
-            .next()
-            .map(|header| std::str::from_utf8(header.value).ok())
-            .map_or(Some(None), |v| v.map(Some))?;
+        let first = named.next().map(|header| std::str::from_utf8(header.value)).transpose().ok()?;
         // Two of one name are two answers to the same question.
         named.next().is_none().then_some(first)
     };

@@ -157,12 +157,8 @@ impl Shared {
             ("/socket", Some(key)) => {
                 let viewer = self.viewers.fetch_add(1, Ordering::SeqCst);
                 if !self.board.enter(viewer, MOST_VIEWERS) {
-                    return request::answer(
-                        &mut stream,
-                        "503 Service Unavailable",
-                        "too many viewers\n",
-                        &origin,
-                    );
+                    let status = "503 Service Unavailable";
+                    return request::answer(&mut stream, status, "too many viewers\n", &origin);
                 }
                 let accept = derive_accept_key(key.as_bytes());
                 let head = format!(
@@ -170,11 +166,8 @@ impl Shared {
                      Sec-WebSocket-Accept: {accept}\r\n\r\n"
                 );
                 let begun = io::Write::write_all(&mut stream, head.as_bytes());
-                begun.and_then(|()| viewer::serve(stream, viewer, &self.board, &self.requests)).inspect_err(
-                    |_| {
-                        self.board.leave(viewer);
-                    },
-                )
+                let served = begun.and_then(|()| viewer::serve(stream, viewer, &self.board, &self.requests));
+                served.inspect_err(|_| self.board.leave(viewer))
             }
             _ => request::answer(&mut stream, "404 Not Found", "there is nothing here\n", &origin),
         }

@@ -13,11 +13,19 @@
 
 #![cfg(feature = "cli")]
 
+#[path = "../common/command.rs"]
+mod command;
+#[path = "../common/folders.rs"]
+mod folders;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde_json::{Value, json};
 use tempfile::TempDir;
+
+use command::done;
+use folders::temporary;
 
 /// A folder with a report, and what the program said of itself in tables.
 struct Report {
@@ -27,17 +35,9 @@ struct Report {
 
 impl Report {
     fn of(arguments: &[&str]) -> Self {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let out = folder.path().join("out");
-        let output = Command::new(env!("CARGO_BIN_EXE_flockform"))
-            .args(arguments)
-            .args(["--quiet", "--out", "out"])
-            .current_dir(folder.path())
-            .env_remove("RUST_LOG")
-            .output()
-            .expect("the program starts");
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        Self { _folder: folder, out }
+        let folder = temporary();
+        done(&[arguments, &["--quiet", "--out", "out"]].concat(), folder.path());
+        Self { out: folder.path().join("out"), _folder: folder }
     }
 
     fn tour(&self, asked: &Value) -> Value {

@@ -6,32 +6,18 @@ use std::time::Duration;
 
 use crate::program::*;
 
-fn said(arguments: &[&str], folder: &Path) -> String {
-    let output = flockform(arguments, folder);
-    assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
-    text(&output.stdout)
-}
-
 fn json(arguments: &[&str], folder: &Path) -> serde_json::Value {
-    let said = said(arguments, folder);
-    serde_json::from_str(&said).unwrap_or_else(|error| panic!("{arguments:?}: {error}: {said}"))
-}
-
-fn refused(arguments: &[&str], folder: &Path, words: &[&str]) {
-    let output = flockform(arguments, folder);
-    let why = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {why}");
-    words.iter().for_each(|word| assert!(why.contains(word), "{arguments:?} does not say `{word}`: {why}"));
+    crate::json::json(&done(arguments, folder))
 }
 
 #[test]
 fn show_prints_a_bundled_file_as_it_is() {
     let folder = temporary();
     let scene = flockform::scene::bundled("tension").expect("bundled");
-    assert_eq!(said(&["show", "tension"], folder.path()), scene.text);
+    assert_eq!(done(&["show", "tension"], folder.path()), scene.text);
     let swarm = flockform::scene::bundled::bundled_swarm("square").expect("bundled");
-    assert_eq!(said(&["show", "square"], folder.path()), swarm.text);
-    refused(&["show", "tensoin"], folder.path(), &["`tensoin`", "`tension`"]);
+    assert_eq!(done(&["show", "square"], folder.path()), swarm.text);
+    refused_in(&["show", "tensoin"], folder.path(), &["`tensoin`", "`tension`"]);
 }
 
 #[test]
@@ -40,7 +26,7 @@ fn every_bundled_file_is_a_valid_beginning_with_comments() {
     let kinds = [("scene", flockform::scene::bundled::SCENES), ("swarm", flockform::scene::bundled::SWARMS)];
     for (kind, all) in kinds {
         for one in all {
-            said(&["new", kind, one.name, "--from", one.name], folder.path());
+            done(&["new", kind, one.name, "--from", one.name], folder.path());
             let path = folder.path().join(format!("{}.toml", one.name));
             let written = std::fs::read_to_string(&path).expect("written");
             assert!(written.starts_with("# A ") && written.ends_with(one.text), "{written}");
@@ -56,18 +42,18 @@ fn every_bundled_file_is_a_valid_beginning_with_comments() {
 #[test]
 fn new_begins_with_a_file_that_runs_and_never_replaces_one() {
     let folder = temporary();
-    let words = said(&["new", "scene", "mine"], folder.path());
+    let words = done(&["new", "scene", "mine"], folder.path());
     assert!(words.contains("mine.toml") && words.contains("flockform run mine.toml"), "{words}");
-    said(&["run", "mine.toml", "-q", "--steps", "2", "--figures", "none"], folder.path());
-    said(&["new", "swarm", "fleet.toml"], folder.path());
-    said(&["plan", "fleet.toml"], folder.path());
+    done(&["run", "mine.toml", "-q", "--steps", "2", "--figures", "none"], folder.path());
+    done(&["new", "swarm", "fleet.toml"], folder.path());
+    done(&["plan", "fleet.toml"], folder.path());
     std::fs::write(folder.path().join("mine.toml"), "years of work").expect("writable");
-    refused(&["new", "scene", "mine"], folder.path(), &["mine.toml is there already"]);
-    refused(&["new", "scene", "no/mine"], folder.path(), &["no/mine.toml", "mkdir -p no"]);
+    refused_in(&["new", "scene", "mine"], folder.path(), &["mine.toml is there already"]);
+    refused_in(&["new", "scene", "no/mine"], folder.path(), &["no/mine.toml", "mkdir -p no"]);
     assert_eq!(std::fs::read(folder.path().join("mine.toml")).expect("there"), b"years of work");
-    refused(&["new", "scene", "nowhere/mine"], folder.path(), &["cannot write nowhere/mine.toml"]);
-    refused(&["new", "scene", "a b"], folder.path(), &["`a b` cannot be the name"]);
-    refused(&["new", "scene", "other", "--from", "square"], folder.path(), &["`square` is a swarm"]);
+    refused_in(&["new", "scene", "nowhere/mine"], folder.path(), &["cannot write nowhere/mine.toml"]);
+    refused_in(&["new", "scene", "a b"], folder.path(), &["`a b` cannot be the name"]);
+    refused_in(&["new", "scene", "other", "--from", "square"], folder.path(), &["`square` is a swarm"]);
     assert!(!folder.path().join("other.toml").exists());
 }
 
@@ -75,18 +61,18 @@ fn new_begins_with_a_file_that_runs_and_never_replaces_one() {
 fn a_file_of_the_other_kind_is_named_with_its_command() {
     let folder = temporary();
     for command in ["run", "compare", "stability", "trade"] {
-        refused(&[command, "square"], folder.path(), &["`square` is a swarm", "flockform swarm square"]);
+        refused_in(&[command, "square"], folder.path(), &["`square` is a swarm", "flockform swarm square"]);
     }
     for command in ["swarm", "node", "robots"] {
         let words = [command, "tension"];
-        refused(&words, folder.path(), &["`tension` is a scene", "flockform run tension"]);
+        refused_in(&words, folder.path(), &["`tension` is a scene", "flockform run tension"]);
     }
-    said(&["new", "swarm", "fleet"], folder.path());
-    said(&["new", "scene", "mine"], folder.path());
-    refused(&["run", "fleet.toml"], folder.path(), &["is a swarm", "flockform swarm fleet.toml"]);
-    refused(&["swarm", "mine.toml"], folder.path(), &["is a scene", "flockform run mine.toml"]);
+    done(&["new", "swarm", "fleet"], folder.path());
+    done(&["new", "scene", "mine"], folder.path());
+    refused_in(&["run", "fleet.toml"], folder.path(), &["is a swarm", "flockform swarm fleet.toml"]);
+    refused_in(&["swarm", "mine.toml"], folder.path(), &["is a scene", "flockform run mine.toml"]);
     // A mistake in a file of the right kind is that mistake.
-    refused(&["run", "mine.toml", "--set", "lattice.spacing=-1"], folder.path(), &["lattice.spacing"]);
+    refused_in(&["run", "mine.toml", "--set", "lattice.spacing=-1"], folder.path(), &["lattice.spacing"]);
 }
 
 #[test]
@@ -110,7 +96,7 @@ fn list_plan_and_run_have_json() {
 #[test]
 fn a_scene_from_a_pipe_is_planned() {
     let folder = temporary();
-    let scene = said(&["show", "tension"], folder.path());
+    let scene = done(&["show", "tension"], folder.path());
     let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_flockform"))
         .args(["plan", "/dev/stdin"])
         .stdin(std::process::Stdio::piped())
@@ -127,7 +113,7 @@ fn a_scene_from_a_pipe_is_planned() {
 #[test]
 fn the_plan_of_a_swarm_states_margins_and_speeds() {
     let folder = temporary();
-    let words = said(&["plan", "square"], folder.path());
+    let words = done(&["plan", "square"], folder.path());
     for word in ["robots", "delay margin", "noise margin", "speed limit", "manoeuvre", "`turn`"] {
         assert!(words.contains(word), "no `{word}` in\n{words}");
     }
@@ -139,21 +125,21 @@ fn the_plan_of_a_swarm_states_margins_and_speeds() {
     // Followers that are in their places at once set no speed, and ideal robots none either.
     assert_eq!(plan["speed"]["reachable"], 0.7);
     let unlimited = ["plan", "gap", "--set", "limits={ clearance = 0.1 }"];
-    let ideal = said(&unlimited, folder.path());
+    let ideal = done(&unlimited, folder.path());
     assert!(ideal.contains("  reachable speed   not limited: ideal robots"), "{ideal}");
     assert!(ideal.contains("limits.clearance without limits.speed holds for poses of now alone"), "{ideal}");
     let planned = json(&[&unlimited[..], &["--json"]].concat(), folder.path());
     assert!(planned["speed"]["reachable"].is_null(), "{ideal}");
     for name in ["gap", "patch", "antipodal", "faulty-robot", "bridge"] {
-        assert!(said(&["plan", name], folder.path()).contains("robots"), "{name}");
+        assert!(done(&["plan", name], folder.path()).contains("robots"), "{name}");
     }
-    refused(&["plan", "square", "--set", "limits.speed=-1"], folder.path(), &["limits.speed"]);
+    refused_in(&["plan", "square", "--set", "limits.speed=-1"], folder.path(), &["limits.speed"]);
     assert!(files(folder.path()).is_empty());
 }
 
 /// The words that bash offers at the end of a command line.
 fn completed(line: &[&str], folder: &Path) -> Vec<String> {
-    let script = said(&["completions", "bash"], folder);
+    let script = done(&["completions", "bash"], folder);
     std::fs::write(folder.join("completion"), script).expect("writable");
     let words: Vec<String> = line.iter().map(|word| format!("'{word}'")).collect();
     let (last, before) = (line[line.len() - 1], line[line.len() - 2]);
@@ -173,14 +159,14 @@ fn completion_knows_the_names_of_scenes_and_swarms() {
     assert_eq!(completed(&["flockform", "swarm", "squ"], folder.path()), ["square"]);
     assert_eq!(completed(&["flockform", "show", "ga"], folder.path()), ["gap"]);
     assert!(completed(&["flockform", "run", "squ"], folder.path()).is_empty());
-    let zsh = said(&["completions", "zsh"], folder.path());
+    let zsh = done(&["completions", "zsh"], folder.path());
     assert!(zsh.contains("bundled file\\:(square gap") && zsh.contains("files\\:file\\:_files"), "{zsh}");
     let of_names = |before: &str| zsh.matches(&format!("{before}:(square gap")).count();
     assert_eq!(of_names(""), of_names("\\"), "a place that completes names alone");
-    let fish = said(&["completions", "fish"], folder.path());
+    let fish = done(&["completions", "fish"], folder.path());
     assert!(fish.contains("__fish_seen_subcommand_from run\" -a \"tension"), "{fish}");
     // They are not in the help, where they would be half of it.
-    assert!(!said(&["run", "--help"], folder.path()).contains("possible values: tension"));
+    assert!(!done(&["run", "--help"], folder.path()).contains("possible values: tension"));
 }
 
 #[cfg(target_os = "linux")]
@@ -209,5 +195,5 @@ fn open_hands_the_report_to_the_platform_and_a_missing_opener_is_no_failure() {
     assert!(opened.trim_end().ends_with("o/report.html"), "{opened}");
     let without = run("o2", "/nowhere");
     assert!(without.status.success() && text(&without.stderr).contains("open it by hand"));
-    refused(&["run", "tension", "--open", "--no-report"], folder.path(), &["cannot be used with"]);
+    refused_in(&["run", "tension", "--open", "--no-report"], folder.path(), &["cannot be used with"]);
 }

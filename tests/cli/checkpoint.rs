@@ -1,7 +1,7 @@
 //! `flockform run --resume`: a killed run goes on as if nothing had been.
 
 use std::path::{Path, PathBuf};
-use std::process::{Child, Stdio};
+use std::process::Child;
 use std::time::{Duration, Instant};
 
 use crate::program::*;
@@ -9,11 +9,6 @@ use crate::program::*;
 /// Fracture, with probes, figures and frames: everything that a run keeps.
 const RUN: [&str; 8] =
     ["run", "fracture", "--out", "o", "--set", "record.vtk_every=25", "--set", "record.figures=[50, 150]"];
-
-fn start(arguments: &[&str], folder: &Path) -> Child {
-    let mut command = command(arguments, folder);
-    command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program starts")
-}
 
 /// Every file below a folder, by its path in it; what a summary says of times left out.
 fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
@@ -56,13 +51,18 @@ fn wait_for(path: &Path) {
     within(Duration::from_secs(60), &path.display().to_string(), || path.exists().then_some(()));
 }
 
-/// A run without end, killed when it has kept a checkpoint.
-fn killed(folder: &Path) {
-    let endless = ["--set", "stop.steps=100000000", "--checkpoint-every", "1steps"];
-    let mut child = start(&[&["run", "tension", "--out", "o"][..], &endless].concat(), folder);
-    wait_for(&folder.join("o.unfinished"));
+fn kill(mut child: Child) {
     child.kill().expect("kills");
     child.wait().expect("ends");
+}
+
+/// A run without end that has kept a checkpoint.
+fn endless(more: &[&str], folder: &Path) -> Child {
+    let run =
+        ["run", "tension", "--out", "o", "--set", "stop.steps=100000000", "--checkpoint-every", "1steps"];
+    let child = start(&[&run[..], more].concat(), folder);
+    wait_for(&folder.join("o.unfinished"));
+    child
 }
 
 /// Kills a run, and the runs that go on with it, until one is done.
@@ -102,8 +102,7 @@ fn a_run_killed_at_random_and_resumed_leaves_the_files_of_a_whole_one() {
     let kills: usize = std::env::var("FLOCKFORM_KILLS").map_or(6, |kills| kills.parse().expect("a number"));
     let folder = temporary();
     let begun = Instant::now();
-    let output = flockform(&RUN, folder.path());
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    done(&RUN, folder.path());
     let took = begun.elapsed();
     let whole = contents(&folder.path().join("o"));
     let mut state = 7_u64;
@@ -125,7 +124,7 @@ fn a_run_killed_at_random_and_resumed_leaves_the_files_of_a_whole_one() {
 fn a_run_killed_while_it_writes_its_results_leaves_all_of_them_when_resumed() {
     let folder = temporary();
     let every = [&RUN[..], &["-q", "--checkpoint-every", "1steps"]].concat();
-    assert!(flockform(&RUN, folder.path()).status.success());
+    done(&RUN, folder.path());
     let whole = contents(&folder.path().join("o"));
     let unfinished = folder.path().join("o.unfinished");
     // The first of the results; pictures, which take longest, come after it.
@@ -136,14 +135,12 @@ fn a_run_killed_while_it_writes_its_results_leaves_all_of_them_when_resumed() {
         while !first_result.exists() && child.try_wait().expect("a child").is_none() {
             std::thread::sleep(Duration::from_millis(1));
         }
-        child.kill().expect("kills");
-        child.wait().expect("ends");
+        kill(child);
         if unfinished.exists() {
             break;
         }
     }
-    let output = flockform(&["run", "--resume", "o", "-q"], folder.path());
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    done(&["run", "--resume", "o", "-q"], folder.path());
     assert_same(&folder.path().join("o"), &whole, "resumed from the last step");
 }
 
@@ -153,7 +150,7 @@ fn an_interrupted_run_goes_on_from_its_own_output() {
     let folder = temporary();
     let steps = ["--set", "stop.steps=20000", "--set", "record.vtk_every=4000"];
     let run = |out: &'static str| [&["run", "tension", "-q", "--out", out][..], &steps].concat();
-    assert!(flockform(&run("whole"), folder.path()).status.success());
+    done(&run("whole"), folder.path());
     let whole = contents(&folder.path().join("whole"));
     // What cannot save within a second, on a machine that has other work, leaves what `o.unfinished` has, or nothing.
     for attempt in 0..20 {
@@ -171,8 +168,7 @@ fn an_interrupted_run_goes_on_from_its_own_output() {
         }
         assert_eq!(status.code(), Some(i32::from(!folder.path().join("o").exists() || left[0])));
         if left.contains(&true) {
-            let output = flockform(&["run", "--resume", "o", "-q"], folder.path());
-            assert!(output.status.success(), "{}", text(&output.stderr));
+            done(&["run", "--resume", "o", "-q"], folder.path());
         }
         if folder.path().join("o").exists() {
             break;
@@ -185,17 +181,12 @@ fn an_interrupted_run_goes_on_from_its_own_output() {
 #[test]
 fn a_checkpoint_that_cannot_be_gone_on_from_is_refused_by_name_and_left_alone() {
     let folder = temporary();
-    killed(folder.path());
+    kill(endless(&[], folder.path()));
     let path = folder.path().join("o.unfinished/checkpoint");
     let good = std::fs::read(&path).expect("there");
     let refused = |bytes: &[u8], arguments: &[&str], words: &[&str]| {
         std::fs::write(&path, bytes).expect("written");
-        let output = flockform(arguments, folder.path());
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
-        for word in words {
-            assert!(said.contains(word), "{arguments:?} does not say `{word}`:\n{said}");
-        }
+        refused_in(arguments, folder.path(), words);
         assert!(std::fs::read(&path).expect("there") == bytes, "{arguments:?} changed it");
         assert!(!folder.path().join("o").exists());
     };
@@ -219,14 +210,10 @@ fn a_checkpoint_that_cannot_be_gone_on_from_is_refused_by_name_and_left_alone() 
 #[test]
 fn an_unfinished_run_is_in_nobody_s_way_unless_it_is_discarded() {
     let folder = temporary();
-    killed(folder.path());
+    kill(endless(&[], folder.path()));
     let again = ["run", "tension", "--out", "o", "-q"];
-    let output = flockform(&again, folder.path());
-    assert_eq!(output.status.code(), Some(2));
-    let said = text(&output.stderr);
-    assert!(said.contains("--resume") && said.contains("--force"), "{said}");
-    let output = flockform(&[&again[..], &["--force"]].concat(), folder.path());
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    refused_in(&again, folder.path(), &["--resume", "--force"]);
+    done(&[&again[..], &["--force"]].concat(), folder.path());
     assert!(!folder.path().join("o.unfinished").exists() && folder.path().join("o/final.csv").is_file());
 }
 
@@ -234,19 +221,12 @@ fn an_unfinished_run_is_in_nobody_s_way_unless_it_is_discarded() {
 #[test]
 fn figures_that_nobody_asked_for_until_a_run_is_gone_on_with_are_said_to_be_missing() {
     let folder = temporary();
-    let endless = ["--set", "stop.steps=100000000", "--checkpoint-every", "1steps", "--figures", "none"];
-    let run =
-        [&["run", "tension", "--out", "o", "--set", "record.figures=[1, 99999999]"][..], &endless].concat();
-    let mut child = start(&run, folder.path());
-    wait_for(&folder.path().join("o.unfinished"));
-    child.kill().expect("kills");
-    child.wait().expect("ends");
+    kill(endless(&["--figures", "none", "--set", "record.figures=[1, 99999999]"], folder.path()));
     let mut child = start(&["run", "--resume", "o"], folder.path());
     let mut said = String::new();
     let stderr = child.stderr.take().expect("piped");
     std::io::BufRead::read_line(&mut std::io::BufReader::new(stderr), &mut said).expect("text");
-    child.kill().expect("kills");
-    child.wait().expect("ends");
+    kill(child);
     assert!(said.contains("there are none of steps 1\n"), "{said}");
 }
 
@@ -256,11 +236,11 @@ fn what_is_no_run_where_an_unfinished_one_would_be_kept_is_refused_at_the_start(
     std::fs::create_dir(folder.path().join("o.unfinished")).expect("writable");
     std::fs::write(folder.path().join("o.unfinished/thesis"), "years of work").expect("writable");
     for force in [&[][..], &["--force"]] {
-        let output =
-            flockform(&[&["run", "tension", "--steps", "2", "--out", "o"], force].concat(), folder.path());
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{said}");
-        assert!(said.contains("o.unfinished is in the way") && said.contains("--out"), "{said}");
+        refused_in(
+            &[&["run", "tension", "--steps", "2", "--out", "o"], force].concat(),
+            folder.path(),
+            &["o.unfinished is in the way", "--out"],
+        );
     }
     assert_eq!(names_in(folder.path()), ["o.unfinished"]);
 }
@@ -269,23 +249,16 @@ fn what_is_no_run_where_an_unfinished_one_would_be_kept_is_refused_at_the_start(
 #[test]
 fn a_run_that_still_runs_is_not_resumed_by_another() {
     let folder = temporary();
-    let endless = ["--set", "stop.steps=100000000", "--checkpoint-every", "1steps"];
-    let mut child = start(&[&["run", "tension", "--out", "o"][..], &endless].concat(), folder.path());
-    wait_for(&folder.path().join("o.unfinished"));
-    let output = flockform(&["run", "--resume", "o"], folder.path());
-    child.kill().expect("kills");
-    child.wait().expect("ends");
-    assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output.stderr).contains("still runs"), "{}", text(&output.stderr));
+    let child = endless(&[], folder.path());
+    refused_in(&["run", "--resume", "o"], folder.path(), &["still runs"]);
+    kill(child);
 }
 
 #[test]
 fn nothing_to_resume_is_said_and_what_a_checkpoint_says_is_not_said_again() {
     let folder = temporary();
     let refused = |arguments: &[&str], word: &str| {
-        let output = flockform(arguments, folder.path());
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-        assert!(text(&output.stderr).contains(word), "{arguments:?}: {}", text(&output.stderr));
+        refused_in(arguments, folder.path(), &[word]);
     };
     refused(&["run", "--resume", "nowhere"], "nothing to resume");
     refused(&["run", "--resume", "o", "--out", "p"], "--out");

@@ -6,9 +6,7 @@ use crate::program::*;
 
 fn compare(folder: &Path, more: &[&str]) -> String {
     let arguments = [&["compare", "beam", "--truth-error", "0.01"], more].concat();
-    let output = flockform(&arguments, folder);
-    assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
-    text(&output.stdout)
+    done(&arguments, folder)
 }
 
 #[test]
@@ -36,18 +34,18 @@ fn a_truth_of_large_rotations_is_told_from_one_of_small_ones() {
 #[test]
 fn places_that_a_scene_names_are_told_beside_the_truth_s() {
     let folder = temporary();
-    let output = flockform(&["compare", "cook", "--out", "o", "--no-report"], folder.path());
-    let said = text(&output.stdout);
-    assert!(output.status.success() && said.contains("at (48, 52): rule, truth"), "{said}");
+    let said = done(&["compare", "cook", "--out", "o", "--no-report"], folder.path());
+    assert!(said.contains("at (48, 52): rule, truth"), "{said}");
     let told = &json_in(&folder.path().join("o/compare.json"))["places"][0];
     for who in ["rule", "truth"] {
         let rise = told[who]["displacement"][1].as_f64().expect("a number");
         assert!((rise / 23.965 - 1.0).abs() < 0.003, "{told}");
     }
-    let output = flockform(&["compare", "cook", "--set", "record.places=[[0.0, 50.0]]"], folder.path());
-    assert_eq!(output.status.code(), Some(2));
-    let said = text(&output.stderr);
-    assert!(said.contains("record.places[0]") && said.contains("outside the body"), "{said}");
+    refused_in(
+        &["compare", "cook", "--set", "record.places=[[0.0, 50.0]]"],
+        folder.path(),
+        &["record.places[0]", "outside the body"],
+    );
 }
 
 #[test]
@@ -80,9 +78,7 @@ fn what_cannot_be_compared_is_refused_with_exit_code_2_and_leaves_nothing() {
         (vec!["compare", "beam", "--set", "neighbours.kind=first"], "cannot carry shear coupling"),
         (vec!["compare", "beem"], "nearest bundled scene is `beam`"),
     ] {
-        let output = flockform(&arguments, folder.path());
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-        assert!(text(&output.stderr).contains(words), "{arguments:?}: {}", text(&output.stderr));
+        refused_in(&arguments, folder.path(), &[words]);
         let left = files(folder.path());
         assert!(left.is_empty(), "{arguments:?} left {left:?}");
     }
@@ -92,8 +88,7 @@ fn what_cannot_be_compared_is_refused_with_exit_code_2_and_leaves_nothing() {
 fn run_and_plan_take_scenes_whose_leaders_the_truth_leads() {
     let folder = temporary();
     for arguments in [&["run", "beam", "--quiet"][..], &["plan", "beam"]] {
-        let output = flockform(arguments, folder.path());
-        assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
+        done(arguments, folder.path());
     }
     let last = std::fs::read_to_string(folder.path().join("out/beam/final.csv")).expect("written");
     // The upper right corner, led by the truth, is 4.08 up and 1.89 back.

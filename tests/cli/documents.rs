@@ -10,9 +10,7 @@ const NESTED: [&str; 1] = ["bench"];
 
 /// Words of the help of a command line's commands, such as `["bench", "sweep"]`.
 fn help(commands: &[&str]) -> String {
-    let output = flockform(&[commands, &["--help"]].concat(), Path::new("."));
-    assert!(output.status.success(), "{commands:?} is no command: {}", text(&output.stderr));
-    text(&output.stdout)
+    done(&[commands, &["--help"]].concat(), Path::new("."))
 }
 
 /// Commands that a help lists.

@@ -1,18 +1,26 @@
 //! What nobody asks for and somebody will meet: runs at once, values without bounds, files that write to the terminal.
 
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
 use crate::program::*;
 
+/// The program under a limit of the shell, which `ulimit` sets.
+fn limited(limit: &str, words: &str, folder: &Path) -> Output {
+    let program = command(&[], folder).get_program().to_string_lossy().into_owned();
+    let script = format!("ulimit {limit}; exec '{program}' {words}");
+    Command::new("sh").args(["-c", &script]).current_dir(folder).output().expect("sh starts")
+}
+
 #[test]
 fn robots_over_shared_memory_are_no_nodes() {
     let folder = temporary();
-    let output = flockform(&["robots", "square", "--transport", "shm", "--node-per-robot"], folder.path());
-    assert_eq!(output.status.code(), Some(2));
-    let said = text(&output.stderr);
-    assert!(said.contains("--node-per-robot") && said.contains("help: "), "{said}");
+    refused_in(
+        &["robots", "square", "--transport", "shm", "--node-per-robot"],
+        folder.path(),
+        &["--node-per-robot", "help: "],
+    );
 }
 
 /// 100,000 corners in teeth as high as the body, upright or slanted, and around a swarm.
@@ -54,12 +62,9 @@ fn outlines_of_a_hundred_thousand_corners_are_answered_at_once() {
     let swarm = flockform(&["show", "square"], folder.path());
     let fenced = text(&swarm.stdout).replace("[limits]", &format!("[limits]\n{}", &fence["limits.".len()..]));
     std::fs::write(folder.path().join("fenced.toml"), fenced).expect("writable");
-    let program = command(&[], folder.path()).get_program().to_string_lossy().into_owned();
     for name in ["upright", "turned", "slanted", "fenced"] {
         // Of processor time, whatever else the computer has to do.
-        let script = format!("ulimit -t 5; exec '{program}' plan {name}.toml");
-        let output = Command::new("sh").args(["-c", &script]).current_dir(folder.path()).output();
-        let output = output.expect("sh starts");
+        let output = limited("-t 5", &format!("plan {name}.toml"), folder.path());
         let said = text(&output.stderr);
         assert!(output.status.code().is_some(), "{name}: it takes more than five seconds");
         assert!(output.status.success() || said.contains("help: "), "{name}: {said}");
@@ -105,19 +110,14 @@ fn runs_that_begin_at_once_get_a_folder_each() {
 fn a_body_beyond_the_memory_that_is_there_is_refused_with_both_numbers() {
     let folder = temporary();
     let limited = |columns: &str, words: &str| {
-        let program = command(&[], folder.path()).get_program().to_string_lossy().into_owned();
         let body = format!("body.shape={{kind=\"grid\",columns={columns},rows={columns}}}");
-        let run = format!("ulimit -v 3000000; exec '{program}' {words} tension --set '{body}'");
-        Command::new("sh").args(["-c", &run]).current_dir(folder.path()).output().expect("sh starts")
+        limited("-v 3000000", &format!("{words} tension --set '{body}'"), folder.path())
     };
     // 63 bytes a particle are 6.3 and 3.1 GB; that is known before any of it is asked for.
     for columns in ["10000", "7000"] {
         for words in ["run --out o", "plan"] {
-            let output = limited(columns, words);
-            let said = text(&output.stderr);
-            assert_eq!(output.status.code(), Some(2), "{columns}: {said}");
-            assert!(said.contains("GiB of memory or more") && said.contains("`ulimit -v`"), "{said}");
-            assert!(said.contains("help: "), "{said}");
+            let words_of_both = ["GiB of memory or more", "`ulimit -v`", "help: "];
+            assert_refused(&limited(columns, words), columns, &words_of_both);
         }
     }
     assert!(names_in(folder.path()).is_empty());
@@ -136,14 +136,9 @@ fn points_whose_lists_are_beyond_the_memory_that_is_there_are_refused_as_a_body_
     let scene = "title = \"heap\"\nbody = { shape = { kind = \"points\", file = \"heap.csv\" } }\n\
                  neighbours = { kind = \"within\", radius = 1.5 }\nstop = { steps = 1 }\n";
     std::fs::write(folder.path().join("heap.toml"), scene).expect("written");
-    let program = command(&[], folder.path()).get_program().to_string_lossy().into_owned();
     for words in ["run heap.toml --out o", "plan heap.toml"] {
-        let run = format!("ulimit -v 2500000; exec '{program}' {words}");
-        let output =
-            Command::new("sh").args(["-c", &run]).current_dir(folder.path()).output().expect("sh starts");
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{words}: {said}");
-        assert!(said.contains("GiB of memory or more") && said.contains("`ulimit -v`"), "{words}: {said}");
+        let output = limited("-v 2500000", words, folder.path());
+        assert_refused(&output, words, &["GiB of memory or more", "`ulimit -v`"]);
     }
     assert_eq!(names_in(folder.path()), ["heap.csv", "heap.toml"]);
 }
@@ -179,10 +174,7 @@ fn names_that_are_not_utf_8_are_taken_as_they_are_or_refused_in_words() {
     let [tension, key] = ["tension", "--set"].map(OsStr::new);
     for command in ["run", "compare", "plan"].map(OsStr::new) {
         for refused in [&[command, &scene][..], &[command, tension, key, &set]] {
-            let output = run(refused);
-            let said = text(&output.stderr);
-            assert_eq!(output.status.code(), Some(2), "{refused:?}: {said}");
-            assert!(said.contains("UTF-8"), "{refused:?}: {said}");
+            assert_refused(&run(refused), &format!("{refused:?}"), &["UTF-8"]);
         }
     }
 }
@@ -193,10 +185,8 @@ fn values_that_overflow_end_as_a_divergence() {
         let folder = temporary();
         let motion = format!("roles[1].motion.per_step=[{pull},0.0]");
         let run = ["run", "tension", "--out", "o", "--no-report", "--figures", "none", "--set", &motion];
-        let output =
-            flockform(&[&run[..], &["--set", "stop.divergence_ratio=1e300"]].concat(), folder.path());
-        assert_eq!(output.status.code(), Some(1), "{pull}: {}", text(&output.stdout));
-        assert!(text(&output.stdout).contains("diverged"), "{pull}: {}", text(&output.stdout));
+        let said = failed(&[&run[..], &["--set", "stop.divergence_ratio=1e300"]].concat(), folder.path());
+        assert!(said.contains("diverged"), "{pull}: {said}");
         let summary = json_in(&folder.path().join("o/summary.json"));
         assert_eq!(summary["stop_reason"], "diverged", "{pull}");
         assert!(summary["energies"]["pe1"].is_number(), "{pull}: {}", summary["energies"]);
@@ -232,11 +222,8 @@ fn a_radius_beyond_everything_is_refused_at_once() {
     ] {
         let begun = Instant::now();
         let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
-        let output =
-            flockform(&[&["plan", "tension"][..], &sets, &["--set", "frame=none"]].concat(), Path::new("."));
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{sets:?}: {said}");
-        assert!(said.contains("neighbours") && said.contains("at most"), "{sets:?}: {said}");
+        let arguments = [&["plan", "tension"][..], &sets, &["--set", "frame=none"]].concat();
+        refused(&arguments, &["neighbours", "at most"]);
         assert!(begun.elapsed() < Duration::from_secs(20), "{sets:?}: {:?}", begun.elapsed());
     }
 }
@@ -276,13 +263,7 @@ fn shapes_that_no_lattice_follows_are_refused_by_name_and_place() {
         ),
     ];
     for (body, key, words) in cases {
-        let folder = temporary();
         let sets = ["--set", &body, "--set", "lattice.spacing=1.0", "--set", "record.places=[]"];
-        let output = flockform(&[&["run", "bar", "--out", "o"][..], &sets].concat(), folder.path());
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{body}: {said}");
-        for part in [key, words, "help: "] {
-            assert!(said.contains(part), "{body} does not say `{part}`:\n{said}");
-        }
+        refused(&[&["run", "bar", "--out", "o"][..], &sets].concat(), &[key, words, "help: "]);
     }
 }

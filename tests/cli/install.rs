@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use crate::program::{flockform, temporary, text};
+use crate::program::{done, read, refused_in, temporary, text};
 
 const CHECKOUT: &str = env!("CARGO_MANIFEST_DIR");
 
@@ -25,16 +25,11 @@ fn files(folder: &Path) -> BTreeSet<String> {
     found
 }
 
-fn read(path: impl AsRef<Path>) -> String {
-    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.as_ref().display()))
-}
-
 #[test]
 fn the_package_lies_where_ros_looks_for_it() {
     let folder = temporary();
-    let output = flockform(&["install", "--prefix", "p"], folder.path());
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    assert!(text(&output.stdout).contains("/p/setup.bash'"), "{}", text(&output.stdout));
+    let said = done(&["install", "--prefix", "p"], folder.path());
+    assert!(said.contains("/p/setup.bash'"), "{said}");
 
     let prefix = folder.path().join("p");
     let version =
@@ -115,7 +110,7 @@ fn the_views_show_topics_and_frames_that_the_node_has() {
 #[test]
 fn sourcing_the_prefix_puts_it_first_and_once() {
     let folder = temporary();
-    assert!(flockform(&["install", "--prefix", "a b"], folder.path()).status.success());
+    done(&["install", "--prefix", "a b"], folder.path());
     let script = "set -eu; . 'a b/setup.bash'; . 'a b/local_setup.bash'; printf %s \"$AMENT_PREFIX_PATH\"";
     let shell = std::process::Command::new("bash")
         .args(["-c", script])
@@ -135,12 +130,11 @@ fn sourcing_the_prefix_puts_it_first_and_once() {
 #[test]
 fn installing_again_renews_what_is_ours() {
     let folder = temporary();
-    let install = || flockform(&["install", "--prefix", "."], folder.path());
-    assert!(install().status.success());
+    let install = || done(&["install", "--prefix", "."], folder.path());
+    install();
     let before = files(folder.path());
     std::fs::remove_file(folder.path().join("setup.bash")).expect("installed");
-    let output = install();
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    install();
     assert_eq!(files(folder.path()), before);
 }
 
@@ -148,21 +142,19 @@ fn installing_again_renews_what_is_ours() {
 fn a_file_that_was_changed_is_replaced_by_force_only() {
     let folder = temporary();
     let parameters = folder.path().join("share/flockform/parameters/formation.yaml");
-    assert!(flockform(&["install", "--prefix", "."], folder.path()).status.success());
+    done(&["install", "--prefix", "."], folder.path());
     std::fs::write(&parameters, "mine").expect("writable");
     let before = files(folder.path());
 
-    let output = flockform(&["install", "--prefix", "."], folder.path());
-    assert_eq!(output.status.code(), Some(2));
-    let message = text(&output.stderr);
-    assert!(
-        message.contains("formation.yaml is not flockform's") && message.contains("--force"),
-        "{message}"
+    refused_in(
+        &["install", "--prefix", "."],
+        folder.path(),
+        &["formation.yaml is not flockform's", "--force"],
     );
     assert_eq!(read(&parameters), "mine");
     assert_eq!(files(folder.path()), before);
 
-    assert!(flockform(&["install", "--prefix", ".", "--force"], folder.path()).status.success());
+    done(&["install", "--prefix", ".", "--force"], folder.path());
     assert!(read(&parameters).contains("ros__parameters"));
 }
 
@@ -170,7 +162,7 @@ fn a_file_that_was_changed_is_replaced_by_force_only() {
 fn a_workspace_keeps_its_own_setup_files() {
     let folder = temporary();
     std::fs::write(folder.path().join("setup.bash"), "colcon").expect("writable");
-    assert!(flockform(&["install", "--prefix", "."], folder.path()).status.success());
+    done(&["install", "--prefix", "."], folder.path());
     assert_eq!(read(folder.path().join("setup.bash")), "colcon");
     assert!(folder.path().join("local_setup.bash").exists());
 }
@@ -179,9 +171,7 @@ fn a_workspace_keeps_its_own_setup_files() {
 fn a_prefix_that_cannot_be_is_refused_and_nothing_is_left() {
     let folder = temporary();
     std::fs::write(folder.path().join("share"), "a file").expect("writable");
-    let output = flockform(&["install", "--prefix", "."], folder.path());
-    assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output.stderr).contains("cannot install"), "{}", text(&output.stderr));
+    refused_in(&["install", "--prefix", "."], folder.path(), &["cannot install"]);
     assert_eq!(files(folder.path()), BTreeSet::from(["share".to_string()]));
 }
 
@@ -195,8 +185,8 @@ fn checksum(bytes: &[u8]) -> String {
 fn what_an_earlier_list_names_is_removed_in_the_package_s_folders_only() {
     let folder = temporary();
     let prefix = folder.path().join("prefix");
-    let install = || flockform(&["install", "--prefix", "prefix"], folder.path());
-    assert!(install().status.success());
+    let install = || done(&["install", "--prefix", "prefix"], folder.path());
+    install();
     let write = |path: &str| std::fs::write(folder.path().join(path), "gone").expect("writable");
     let gone = "prefix/share/flockform/gone.txt";
     let kept = ["important.txt", "prefix/thesis.tex", "prefix/share/other.txt"];
@@ -215,8 +205,7 @@ fn what_an_earlier_list_names_is_removed_in_the_package_s_folders_only() {
     let list = prefix.join("share/flockform/installed-files");
     let lines = named.map(|path| format!("{} {path}\n", checksum(b"gone"))).concat();
     std::fs::write(&list, read(&list) + &lines).expect("writable");
-    let output = install();
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    install();
     for path in kept {
         assert_eq!(read(folder.path().join(path)), "gone", "{path}");
     }

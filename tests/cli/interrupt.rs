@@ -15,27 +15,30 @@ fn patience() -> Duration {
     Duration::from_secs_f64(1.0 + f64::max(0.0, load / cores - 0.5))
 }
 
-fn start(arguments: &[&str], folder: &Path) -> Child {
-    let mut command = command(arguments, folder);
-    command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the program starts")
+/// Waits until the program, which goes on, has come that far.
+fn wait_until(child: &mut Child, is_there: impl Fn() -> bool) {
+    within(Duration::from_secs(60), "its beginning", || {
+        assert!(child.try_wait().expect("a child").is_none(), "it ended by itself");
+        is_there().then_some(())
+    });
 }
 
 /// Waits until the program is busy: it has made its hidden folder, and some time has gone by.
 fn wait_until_busy(child: &mut Child, folder: &Path, busy: Duration) {
-    let begun = Instant::now();
-    while names_in(folder).is_empty() {
-        assert!(begun.elapsed() < Duration::from_secs(60), "it never began");
-        assert!(child.try_wait().expect("a child").is_none(), "it ended by itself");
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    wait_until(child, || !names_in(folder).is_empty());
     std::thread::sleep(busy);
 }
 
-/// The exit code after an interrupt, and what is said; the end comes in time.
-fn ended(mut child: Child, what: &str) -> (Option<i32>, String) {
+/// What is said after an interrupt; the end comes in time, and with exit code 1.
+fn ended(mut child: Child, what: &str) -> String {
     assert!(child.try_wait().expect("a child").is_none(), "{what}: it ended by itself");
-    let (since, patience) = (Instant::now(), patience());
     signal("INT", child.id());
+    ended_after(child, what)
+}
+
+/// The same of a program that has its signals already.
+fn ended_after(mut child: Child, what: &str) -> String {
+    let (since, patience) = (Instant::now(), patience());
     while child.try_wait().expect("a child").is_none() {
         if since.elapsed() > patience {
             child.kill().expect("kills");
@@ -44,7 +47,9 @@ fn ended(mut child: Child, what: &str) -> (Option<i32>, String) {
         std::thread::sleep(Duration::from_millis(5));
     }
     let output = child.wait_with_output().expect("ended");
-    (output.status.code(), text(&output.stderr))
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{what}: {said}");
+    said
 }
 
 /// A body of 62,500 particles under a rule without a fast path, and none of what asks to see every step.
@@ -75,35 +80,21 @@ steps = 1000000
 #[test]
 fn whatever_leaves_nothing_ends_at_once_and_leaves_nothing() {
     let out = ["-q", "--out", "deep/er/o"];
+    let solve = ["run", "beam-loaded", "--set", "lattice.spacing=0.03", "--set"];
     let jobs: [&[&str]; 6] = [
         &["compare", "cook", "--truth-error", "1e-7"],
         &["trade", "grips"],
         &["stability", "tension"],
         &["gallery"],
         // A solve, and the factorisation that nothing can be asked in the midst of.
-        &[
-            "run",
-            "beam-loaded",
-            "--set",
-            "lattice.spacing=0.03",
-            "--set",
-            "equilibrium={solver=\"direct\",tolerance=1e-10}",
-        ],
-        &[
-            "run",
-            "beam-loaded",
-            "--set",
-            "lattice.spacing=0.03",
-            "--set",
-            "equilibrium={solver=\"jacobi\",tolerance=1e-14}",
-        ],
+        &[&solve[..], &["equilibrium={solver=\"direct\",tolerance=1e-10}"]].concat(),
+        &[&solve[..], &["equilibrium={solver=\"jacobi\",tolerance=1e-14}"]].concat(),
     ];
     for job in jobs {
         let folder = temporary();
         let mut child = start(&[job, &out].concat(), folder.path());
         wait_until_busy(&mut child, folder.path(), Duration::from_millis(400));
-        let (code, said) = ended(child, &format!("{job:?}"));
-        assert_eq!(code, Some(1), "{job:?}: {said}");
+        let said = ended(child, &format!("{job:?}"));
         assert!(said.contains("interrupted"), "{job:?}: {said}");
         assert!(names_in(folder.path()).is_empty(), "{job:?}: {:?}", files(folder.path()));
     }
@@ -117,16 +108,9 @@ fn a_large_run_of_slow_steps_keeps_its_checkpoint_and_goes_on_from_it() {
     // A step that takes longer than a second, on a machine that has other work, is ended with nothing kept: another try.
     let kept = (0..8).any(|_| {
         let mut child = start(&[&["run", "large.toml", "--out", "o"][..], &quietly].concat(), folder.path());
-        let begun = Instant::now();
-        while !folder.path().join(".o.partial").exists() {
-            assert!(
-                begun.elapsed() < Duration::from_secs(60) && child.try_wait().expect("a child").is_none()
-            );
-            std::thread::sleep(Duration::from_millis(5));
-        }
+        wait_until(&mut child, || folder.path().join(".o.partial").exists());
         std::thread::sleep(Duration::from_millis(700));
-        let (code, said) = ended(child, "a large run");
-        assert_eq!(code, Some(1), "{said}");
+        let said = ended(child, "a large run");
         let is_kept = said.contains("--resume");
         let left: &[&str] = if is_kept { &["large.toml", "o.unfinished"] } else { &["large.toml"] };
         assert_eq!(names_in(folder.path()), left, "{said}");
@@ -135,8 +119,7 @@ fn a_large_run_of_slow_steps_keeps_its_checkpoint_and_goes_on_from_it() {
     assert!(kept, "a large run that is interrupted never keeps its checkpoint");
     let resumed = start(&[&["run", "--resume", "o"][..], &quietly].concat(), folder.path());
     std::thread::sleep(Duration::from_secs(2));
-    let (code, said) = ended(resumed, "the same run, resumed");
-    assert_eq!(code, Some(1), "{said}");
+    ended(resumed, "the same run, resumed");
     assert_eq!(names_in(folder.path()), ["large.toml", "o.unfinished"]);
 }
 
@@ -147,8 +130,7 @@ fn kept(job: &[&str], busy: Duration, result: &str) -> (tempfile::TempDir, Strin
         let folder = temporary();
         let mut child = start(&[job, &["--out", "o"]].concat(), folder.path());
         wait_until_busy(&mut child, folder.path(), busy);
-        let (code, said) = ended(child, &format!("{job:?}"));
-        assert_eq!(code, Some(1), "{said}");
+        let said = ended(child, &format!("{job:?}"));
         let is_kept = folder.path().join("o").join(result).is_file();
         assert_ne!(is_kept, said.contains("nothing is kept"), "{said}: {:?}", files(folder.path()));
         assert!(is_kept || names_in(folder.path()).is_empty(), "{said}: {:?}", files(folder.path()));
@@ -193,8 +175,7 @@ fn results_that_take_long_to_write_keep_no_program_from_ending() {
         let folder = temporary();
         let mut child = start(&[&job[..], &["-q", "--out", "o"]].concat(), folder.path());
         wait_until_busy(&mut child, folder.path(), Duration::from_secs(seconds));
-        let (code, said) = ended(child, &format!("{job:?}"));
-        assert_eq!(code, Some(1), "{said}");
+        let said = ended(child, &format!("{job:?}"));
         let left = names_in(folder.path());
         match said.contains("nothing is kept") {
             true => assert!(left.is_empty(), "{left:?}"),
@@ -215,8 +196,7 @@ fn a_second_interrupt_leaves_no_part_of_the_results() {
         signal("INT", child.id());
         std::thread::sleep(Duration::from_millis(pause));
         let is_sent = crate::signals::is_sent("INT", child.id());
-        let (code, said) = ended_after(child);
-        assert_eq!(code, Some(1), "{said}");
+        let said = ended_after(child, "results");
         let (kept, unfinished) = (folder.path().join("o"), folder.path().join("o.unfinished"));
         if kept.exists() {
             let list = std::fs::read_to_string(kept.join("steps.pvd")).expect("a list of frames");
@@ -248,18 +228,10 @@ fn a_program_whose_words_are_never_taken_ends_too() {
         shell.args(["-c", &script]).current_dir(folder.path()).env_remove("RUST_LOG");
         let mut child = shell.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("sh starts");
         wait_until_busy(&mut child, folder.path(), Duration::from_millis(300));
-        let (since, patience) = (Instant::now(), patience());
         for _ in 0..signals {
             signal("INT", child.id());
         }
-        while child.try_wait().expect("a child").is_none() {
-            if since.elapsed() > patience {
-                child.kill().expect("kills");
-                panic!("not within {patience:?}");
-            }
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        assert_eq!(child.wait().expect("ended").code(), Some(1));
+        ended_after(child, "a full pipe");
         assert!(names_in(folder.path()).is_empty());
     }
 }
@@ -272,22 +244,10 @@ fn a_second_interrupt_ends_at_once() {
     wait_until_busy(&mut child, folder.path(), Duration::from_millis(300));
     signal("INT", child.id());
     signal("INT", child.id());
-    let (code, said) = ended_after(child);
-    assert_eq!(code, Some(1), "{said}");
+    ended_after(child, "a second interrupt");
     let left = names_in(folder.path());
     // Whichever came first: it was all written, or a part that can be resumed, or nothing.
     assert!(left.is_empty() || left == ["o"] || left == ["o.unfinished"], "{left:?}");
-}
-
-/// The end of a program that has its signals already.
-fn ended_after(mut child: Child) -> (Option<i32>, String) {
-    let since = Instant::now();
-    while child.try_wait().expect("a child").is_none() {
-        assert!(since.elapsed() < patience(), "not in time");
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    let output = child.wait_with_output().expect("ended");
-    (output.status.code(), text(&output.stderr))
 }
 
 #[test]
@@ -296,8 +256,7 @@ fn a_program_whose_words_nobody_reads_ends_too() {
     let mut child = start(&["stability", "tension", "-q", "--out", "o"], folder.path());
     wait_until_busy(&mut child, folder.path(), Duration::from_millis(200));
     drop(child.stderr.take());
-    let (code, _) = ended(child, "a closed pipe");
-    assert_eq!(code, Some(1));
+    ended(child, "a closed pipe");
     assert!(names_in(folder.path()).is_empty());
 }
 
@@ -308,14 +267,8 @@ fn figures_are_not_worth_waiting_for() {
     let figures = format!("record.figures=[{}]", every.join(","));
     let run = ["run", "tension", "--out", "o", "--no-report", "--set", "stop.steps=1500", "--set", &figures];
     let mut child = start(&run, folder.path());
-    let begun = Instant::now();
-    let first = folder.path().join(".o.partial/final.csv");
-    while !first.exists() {
-        assert!(begun.elapsed() < Duration::from_secs(60) && child.try_wait().expect("a child").is_none());
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    let (code, said) = ended(child, "figures");
-    assert_eq!(code, Some(1), "{said}");
+    wait_until(&mut child, || folder.path().join(".o.partial/final.csv").exists());
+    let said = ended(child, "figures");
     let left = names_in(folder.path());
     assert!(left.is_empty() || folder.path().join("o/summary.json").is_file(), "{left:?}: {said}");
 }

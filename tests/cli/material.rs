@@ -15,9 +15,7 @@ fn material(arguments: &[&str]) -> Output {
 }
 
 fn said(arguments: &[&str]) -> String {
-    let output = material(arguments);
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).expect("text")
+    done(&[&["material"], arguments].concat(), Path::new("."))
 }
 
 fn report_of(arguments: &[&str]) -> Value {
@@ -26,12 +24,8 @@ fn report_of(arguments: &[&str]) -> Value {
 
 fn refused(arguments: &[&str], words: &[&str]) {
     let output = material(arguments);
-    let complaint = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {complaint}");
+    assert_refused(&output, &arguments.join(" "), words);
     assert!(output.stdout.is_empty());
-    for word in words {
-        assert!(complaint.contains(word), "{arguments:?} does not say `{word}`:\n{complaint}");
-    }
 }
 
 fn close(value: &Value, expected: f64, tolerance: f64) -> bool {

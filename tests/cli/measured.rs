@@ -63,9 +63,8 @@ fn bundled(scene: &str, sets: &[&str]) -> (tempfile::TempDir, String) {
     let folder = temporary();
     let mut arguments = vec!["run", scene, "--out", "o", "--no-report", "--figures", "none"];
     sets.iter().for_each(|set| arguments.extend(["--set", set]));
-    let output = flockform(&arguments, folder.path());
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    (folder, text(&output.stdout))
+    let said = done(&arguments, folder.path());
+    (folder, said)
 }
 
 fn summary(folder: &Path) -> Value {
@@ -490,9 +489,7 @@ fn load_steps_that_make_no_sense_are_refused_by_name() {
     refused(&[BAR, LEAD, &steps("ramp = { steps = 3 }")], &["no load that could grow", "every"]);
     refused(&[BAR, PULL, &steps("")], &["says nothing", "every"]);
     let folder = temporary();
-    let output = flockform(&["run", "tension", "--set", "load_steps={every=5}"], folder.path());
-    assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output.stderr).contains("add [material]"), "{}", text(&output.stderr));
+    refused_in(&["run", "tension", "--set", "load_steps={every=5}"], folder.path(), &["add [material]"]);
 }
 
 #[test]
@@ -502,9 +499,7 @@ fn a_body_that_finds_no_rest_under_more_load_keeps_what_it_had() {
     let folder = temporary();
     let mut arguments = vec!["run", "beam-loaded", "--out", "o", "--no-report", "--figures", "none"];
     sets.iter().chain([&parts]).for_each(|set| arguments.extend(["--set", set]));
-    let output = flockform(&arguments, folder.path());
-    let said = text(&output.stdout);
-    assert_eq!(output.status.code(), Some(1), "{said}{}", text(&output.stderr));
+    let said = failed(&arguments, folder.path());
     assert!(said.contains("increment 1,") && said.contains("not at 1 of the load"), "{said}");
     assert_eq!(summary(folder.path())["stop_reason"], "stuck");
     assert_eq!(table(folder.path().join("o/load.csv"))["factor"], [0.0, 1e-6]);

@@ -52,8 +52,7 @@ fn write(folder: &Path, scene: &str, table: &str) {
 }
 
 fn run(folder: &Path, more: &[&str]) {
-    let output = flockform(&[&["run", "cloud.toml", "-q", "--out", "o"][..], more].concat(), folder);
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    done(&[&["run", "cloud.toml", "-q", "--out", "o"][..], more].concat(), folder);
 }
 
 fn records(path: &Path) -> Vec<csv::StringRecord> {
@@ -205,9 +204,7 @@ fn a_body_that_diverges_names_the_particle_as_its_file_does() {
     let folder = temporary();
     write(folder.path(), SCENE, &table(&shuffled(&cloud(), 6)));
     let grown = ["--set", "rule.feedback={factor=1.0}", "--set", "fracture={}", "--set", "stop.steps=5000"];
-    let output = flockform(&[&["run", "cloud.toml", "--out", "o"][..], &grown].concat(), folder.path());
-    let said = text(&output.stdout);
-    assert_eq!(output.status.code(), Some(1), "{said}{}", text(&output.stderr));
+    let said = failed(&[&["run", "cloud.toml", "--out", "o"][..], &grown].concat(), folder.path());
     let (_, after) = said.split_once(": particle ").expect("it says who");
     let id: usize = after.split_once(' ').expect("and what").0.parse().expect("an id");
     assert!(cloud().iter().any(|row| row.0 == id), "{said}");
@@ -242,13 +239,9 @@ fn a_killed_run_of_points_goes_on_to_the_same_end_unless_its_file_was_sorted_mea
     let mut sorted = rows.clone();
     sorted.sort_by_key(|row| row.0);
     write(folder.path(), &scene, &table(&sorted));
-    let output = flockform(&["run", "--resume", "o", "-q"], folder.path());
-    let said = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{said}");
-    assert!(said.contains("a file that the scene names"), "{said}");
+    refused_in(&["run", "--resume", "o", "-q"], folder.path(), &["a file that the scene names"]);
     write(folder.path(), &scene, &table(&rows));
-    let output = flockform(&["run", "--resume", "o", "-q"], folder.path());
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    done(&["run", "--resume", "o", "-q"], folder.path());
     for (name, expected) in names.iter().zip(&expected) {
         assert!(whole(name) == *expected, "{name} differs");
     }
@@ -258,12 +251,7 @@ fn a_killed_run_of_points_goes_on_to_the_same_end_unless_its_file_was_sorted_mea
 fn refused(arguments: &[&str], scene: &str, table: &str, words: &[&str]) {
     let folder = temporary();
     write(folder.path(), scene, table);
-    let output = flockform(arguments, folder.path());
-    let said = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{words:?}: {said}");
-    for word in words.iter().chain(&["help:"]) {
-        assert!(said.contains(word), "does not say `{word}`:\n{said}");
-    }
+    refused_in(arguments, folder.path(), &[words, &["help:"]].concat());
     let left = files(folder.path());
     assert_eq!(left.len(), 2, "{left:?}");
 }
@@ -349,10 +337,7 @@ fn a_swarm_is_no_cloud() {
     let body = "title = \"s\"\n[body]\nshape = { kind = \"points\", file = \"points/cloud.csv\" }\n";
     for (swarm, word) in [(flown, "scene.name"), (body, "body.shape")] {
         std::fs::write(folder.path().join("swarm.toml"), swarm).expect("written");
-        let output = flockform(&["swarm", "swarm.toml"], folder.path());
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{said}");
-        assert!(said.contains(word) && said.contains("[[robots]]"), "{said}");
+        refused_in(&["swarm", "swarm.toml"], folder.path(), &[word, "[[robots]]"]);
     }
 }
 
@@ -360,12 +345,9 @@ fn a_swarm_is_no_cloud() {
 fn a_plan_and_a_stability_study_know_a_cloud() {
     let folder = temporary();
     write(folder.path(), SCENE, &table(&cloud()));
-    let output = flockform(&["plan", "cloud.toml", "--set", "update.damping=1.9"], folder.path());
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let said = text(&output.stdout);
+    let said = done(&["plan", "cloud.toml", "--set", "update.damping=1.9"], folder.path());
     assert!(said.contains("none: points, the nearest 0."), "{said}");
     assert!(said.contains("240 (") && !said.contains("diverges"), "{said}");
     let linear = ["--set", "fracture={}", "--no-extremes", "-q", "--out", "s"];
-    let output = flockform(&[&["stability", "cloud.toml"][..], &linear].concat(), folder.path());
-    assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
+    done(&[&["stability", "cloud.toml"][..], &linear].concat(), folder.path());
 }

@@ -2,7 +2,7 @@
 
 use std::process::Output;
 
-use crate::command::{command, text};
+use crate::command::{assert_refused, command, text};
 use crate::folders::{names_in, temporary};
 
 /// Variables of each launcher that make this the given one of four ranks.
@@ -24,10 +24,7 @@ const RUN: [&str; 4] = ["run", "tension", "--steps", "3"];
 fn one_of_several_ranks_refuses_to_make_the_whole_run_and_names_the_feature() {
     for launcher in LAUNCHERS {
         let (output, left) = as_rank("0", "4", launcher, &RUN);
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{said}");
-        assert!(said.contains(launcher[0]) && said.contains("one of 4 ranks"), "{said}");
-        assert!(said.contains("--features mpi") && said.contains("env -u"), "{said}");
+        assert_refused(&output, launcher[0], &[launcher[0], "one of 4 ranks", "--features mpi", "env -u"]);
         assert!(left.is_empty(), "{left:?}");
     }
 }
@@ -63,9 +60,7 @@ fn the_first_rank_speaks_of_a_command_line_that_none_can_read_and_prints_the_hel
 fn studies_that_would_write_over_each_other_refuse_too() {
     for arguments in [["compare", "beam"], ["swarm", "gap"], ["stability", "tension"]] {
         let (output, left) = as_rank("0", "2", LAUNCHERS[1], &arguments);
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{said}");
-        assert!(said.contains(&format!("`{}` runs on one", arguments[0])), "{said}");
+        assert_refused(&output, arguments[0], &[&format!("`{}` runs on one", arguments[0])]);
         assert!(left.is_empty(), "{left:?}");
     }
 }

@@ -22,8 +22,7 @@ fn every_command_with_an_outcome_leaves_a_report_unless_told_not_to() {
     ] {
         let run = |more: &[&str]| {
             let arguments = [&words[..], &["--quiet", "--force", "--out", "out"], more].concat();
-            let output = flockform(&arguments, folder.path());
-            assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
+            done(&arguments, folder.path());
         };
         run(&[]);
         let path = folder.path().join("out/report.html");
@@ -41,8 +40,7 @@ fn every_command_with_an_outcome_leaves_a_report_unless_told_not_to() {
 #[test]
 fn a_long_run_is_told_by_evenly_spaced_frames_and_the_page_says_so() {
     let folder = temporary();
-    let output = flockform(&["run", "tension", "--steps", "1301", "--out", "out"], folder.path());
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    done(&["run", "tension", "--steps", "1301", "--out", "out"], folder.path());
     let html = read_to_string(folder.path().join("out/report.html")).expect("written");
     let film = &data(&html)["stages"][0];
     let times: Vec<f64> = serde_json::from_value(film["times"].clone()).expect("numbers");
@@ -54,8 +52,7 @@ fn a_long_run_is_told_by_evenly_spaced_frames_and_the_page_says_so() {
 #[test]
 fn a_body_that_is_solved_for_is_shown_on_its_way_under_the_load() {
     let folder = temporary();
-    let output = flockform(&["run", "beam-loaded", "--out", "out"], folder.path());
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    done(&["run", "beam-loaded", "--out", "out"], folder.path());
     let html = read_to_string(folder.path().join("out/report.html")).expect("written");
     let film = &data(&html)["stages"][0];
     assert_eq!(film["times"].as_array().expect("listed").len(), 21);
@@ -71,8 +68,7 @@ fn a_body_that_is_solved_for_is_shown_on_its_way_under_the_load() {
 #[test]
 fn a_gallery_leads_to_the_reports_of_what_is_named() {
     let folder = temporary();
-    let output = flockform(&["gallery", "square", "tension", "--out", "out"], folder.path());
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    done(&["gallery", "square", "tension", "--out", "out"], folder.path());
     let out = folder.path().join("out");
     let index = read_to_string(out.join("index.html")).expect("written");
     for report in ["scenes/tension/report.html", "swarms/square/report.html"] {
@@ -80,16 +76,14 @@ fn a_gallery_leads_to_the_reports_of_what_is_named() {
         assert!(index.contains(&format!("href=\"{report}\"")), "{report}");
     }
     assert_eq!(index.matches("<img").count(), 2);
-    let again = flockform(&["gallery", "tension", "--out", "out", "--force", "--quiet"], folder.path());
-    assert!(again.status.success(), "its own output may be replaced: {}", text(&again.stderr));
+    // Its own output may be replaced.
+    done(&["gallery", "tension", "--out", "out", "--force", "--quiet"], folder.path());
     assert!(!out.join("swarms").exists());
 }
 
 #[test]
 fn a_gallery_of_what_is_not_bundled_is_refused_with_exit_code_2_and_leaves_nothing() {
     let folder = temporary();
-    let output = flockform(&["gallery", "tensoin", "--out", "out"], folder.path());
-    assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output.stderr).contains("`tension`"), "{}", text(&output.stderr));
+    refused_in(&["gallery", "tensoin", "--out", "out"], folder.path(), &["`tension`"]);
     assert!(!folder.path().join("out").exists());
 }

@@ -1,22 +1,9 @@
 //! `flockform run`, `scenes`, `plan`, `schema`, `trade` and `bench`, and what they refuse.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::program::*;
-
-/// Runs and expects a refusal: exit code 2, these words, nothing on disk.
-fn refused(arguments: &[&str], words: &[&str]) {
-    let folder = temporary();
-    let before = files(folder.path()).len();
-    let output = flockform(arguments, folder.path());
-    let said = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
-    for word in words {
-        assert!(said.contains(word), "{arguments:?} does not say `{word}`:\n{said}");
-    }
-    assert_eq!(files(folder.path()).len(), before, "{arguments:?} left files");
-}
 
 /// As [`refused`] for a scene that is the bundled one with overrides.
 fn refused_with(scene: &str, overrides: &[&str], words: &[&str]) {
@@ -25,16 +12,10 @@ fn refused_with(scene: &str, overrides: &[&str], words: &[&str]) {
     refused(&arguments, words);
 }
 
-fn run_in(folder: &Path, arguments: &[&str]) -> String {
-    let output = flockform(arguments, folder);
-    assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
-    text(&output.stdout)
-}
-
 #[test]
 fn the_main_job_writes_the_figures_and_tables_of_the_paper() {
     let folder = temporary();
-    let said = run_in(folder.path(), &["run", "tension"]);
+    let said = done(&["run", "tension"], folder.path());
     assert!(said.contains("step 401") && said.contains("out/tension"), "{said}");
     let out = folder.path().join("out/tension");
     for figure in ["configuration_0001", "configuration_0020", "pe1_0020", "configuration_0401", "probes"] {
@@ -59,13 +40,11 @@ fn the_main_job_writes_the_figures_and_tables_of_the_paper() {
 #[test]
 fn a_second_run_takes_a_new_folder_unless_one_is_named() {
     let folder = temporary();
-    run_in(folder.path(), &["run", "tension", "--steps", "2", "-q"]);
-    let said = run_in(folder.path(), &["run", "tension", "--steps", "2"]);
+    done(&["run", "tension", "--steps", "2", "-q"], folder.path());
+    let said = done(&["run", "tension", "--steps", "2"], folder.path());
     assert!(said.contains("out/tension-2"), "{said}");
-    let again = flockform(&["run", "tension", "--steps", "2", "--out", "out/tension"], folder.path());
-    assert_eq!(again.status.code(), Some(2));
-    assert!(text(&again.stderr).contains("--force"), "{}", text(&again.stderr));
-    run_in(folder.path(), &["run", "tension", "--steps", "3", "--out", "out/tension", "--force"]);
+    refused_in(&["run", "tension", "--steps", "2", "--out", "out/tension"], folder.path(), &["--force"]);
+    done(&["run", "tension", "--steps", "3", "--out", "out/tension", "--force"], folder.path());
     assert_eq!(json_in(&folder.path().join("out/tension/summary.json"))["steps"], 3);
 }
 
@@ -74,9 +53,11 @@ fn force_leaves_a_folder_alone_that_is_not_ours() {
     let folder = temporary();
     std::fs::create_dir(folder.path().join("mine")).expect("made");
     std::fs::write(folder.path().join("mine/thesis.txt"), "years").expect("written");
-    let output = flockform(&["run", "tension", "--out", "mine", "--force"], folder.path());
-    assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output.stderr).contains("does not look like an output of flockform"));
+    refused_in(
+        &["run", "tension", "--out", "mine", "--force"],
+        folder.path(),
+        &["does not look like an output of flockform"],
+    );
     assert_eq!(files(folder.path()).len(), 1);
 }
 
@@ -94,7 +75,7 @@ fn overrides_and_steps_reach_the_scene() {
     let folder = temporary();
     let sets =
         ["run", "tension", "--steps", "7", "--set", "roles[1].motion.per_step=[0.1, 0.2]", "--out", "o"];
-    run_in(folder.path(), &sets);
+    done(&sets, folder.path());
     let summary = json_in(&folder.path().join("o/summary.json"));
     assert_eq!(summary["steps"], 7);
     assert_eq!(summary["scene"]["roles"][1]["motion"]["per_step"], serde_json::json!([0.1, 0.2]));
@@ -103,7 +84,7 @@ fn overrides_and_steps_reach_the_scene() {
 #[test]
 fn paraview_frames_are_written_when_asked_for() {
     let folder = temporary();
-    run_in(folder.path(), &["run", "tension", "--steps", "5", "--set", "record.vtk_every=2", "--out", "o"]);
+    done(&["run", "tension", "--steps", "5", "--set", "record.vtk_every=2", "--out", "o"], folder.path());
     let frames = files(&folder.path().join("o/steps"));
     // Steps 0, 2 and 4, and the last one.
     assert_eq!(frames.len(), 4, "{frames:?}");
@@ -114,7 +95,7 @@ fn paraview_frames_are_written_when_asked_for() {
 fn the_fracture_scene_breaks_near_the_top_and_its_variants_elsewhere_or_faster() {
     let folder = temporary();
     let broken = |scene: &str| {
-        run_in(folder.path(), &["run", scene, "-q", "--out", scene]);
+        done(&["run", scene, "-q", "--out", scene], folder.path());
         let summary = json_in(&folder.path().join(scene).join("summary.json"));
         let first = &summary["broken_bonds"]["first"];
         (first["along"].as_f64().expect("broke"), first["step"].as_u64().expect("broke"))
@@ -137,9 +118,7 @@ fn a_run_that_diverges_fails_names_the_cause_and_keeps_the_last_good_state() {
     let folder = temporary();
     let arguments =
         ["run", "tension", "--out", "o", "--set", "rule.feedback={factor=1.0}", "--set", "stop.steps=4000"];
-    let output = flockform(&arguments, folder.path());
-    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
-    let said = text(&output.stdout);
+    let said = failed(&arguments, folder.path());
     assert!(said.contains("diverged at step") && said.contains("particle"), "{said}");
     assert!(said.contains("feedback factor 1"), "{said}");
     let summary = json_in(&folder.path().join("o/summary.json"));
@@ -153,9 +132,7 @@ fn a_poisson_term_that_diverges_by_its_centre_is_blamed_on_that() {
     let folder = temporary();
     let arguments =
         ["run", "tension", "--no-report", "--out", "o", "--set", "rule.poisson={k=-0.3,centre=1e9}"];
-    let output = flockform(&arguments, folder.path());
-    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
-    let said = text(&output.stdout);
+    let said = failed(&arguments, folder.path());
     assert!(
         said.contains("= 1000000000, which lies outside the body; leave rule.poisson.centre out"),
         "{said}"
@@ -168,11 +145,7 @@ fn long_run(folder: &Path) -> std::process::Child {
     let child = command(&arguments, folder).stdout(std::process::Stdio::piped()).spawn();
     let child = child.expect("the program starts");
     // The hidden folder shows that it has begun.
-    let patience = Instant::now();
-    while std::fs::read_dir(folder).expect("readable").next().is_none() {
-        assert!(patience.elapsed() < Duration::from_secs(30), "the run never began");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    within(Duration::from_secs(30), "its beginning", || (!names_in(folder).is_empty()).then_some(()));
     std::thread::sleep(Duration::from_millis(200));
     child
 }
@@ -182,7 +155,7 @@ fn long_run(folder: &Path) -> std::process::Child {
 fn a_solved_scene_reports_its_solver_and_how_it_came_to_rest() {
     let folder = temporary();
     let set = ["--set", "equilibrium.solver=conjugate-gradients"];
-    let said = run_in(folder.path(), &[&["run", "beam-loaded", "--out", "here"][..], &set].concat());
+    let said = done(&[&["run", "beam-loaded", "--out", "here"][..], &set].concat(), folder.path());
     assert!(said.contains("conjugate-gradients, asked for:") && said.contains("in equilibrium"), "{said}");
     let here = folder.path().join("here");
     let summary = json_in(&here.join("summary.json"));
@@ -194,15 +167,14 @@ fn a_solved_scene_reports_its_solver_and_how_it_came_to_rest() {
     assert!(here.join("residuals.png").is_file());
     let too_few = ["run", "beam-loaded", "--out", "there", "--set"];
     let asked = "equilibrium={solver=\"jacobi\",most_iterations=3}";
-    let output = flockform(&[&too_few[..], &[asked]].concat(), folder.path());
-    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    failed(&[&too_few[..], &[asked]].concat(), folder.path());
     assert_eq!(json_in(&folder.path().join("there/summary.json"))["stop_reason"], "unsettled");
 }
 
 #[test]
 fn a_trade_study_prints_what_is_cheapest_and_writes_every_setting() {
     let folder = temporary();
-    let said = run_in(folder.path(), &["trade", "grips", "--quick", "--out", "here"]);
+    let said = done(&["trade", "grips", "--quick", "--out", "here"], folder.path());
     for words in ["for 10 % error the cheapest setting is", "the material rule comes as near as"] {
         assert!(said.contains(words), "{said}");
     }
@@ -213,7 +185,7 @@ fn a_trade_study_prints_what_is_cheapest_and_writes_every_setting() {
     assert!(table.lines().any(|line| line.starts_with("material,0.5,") && line.contains(",multigrid,")));
     assert!(here.join("trade.png").is_file() && here.join("trade.svg").is_file());
     let again = ["trade", "grips", "--quick", "--out", "here", "--force", "--quiet"];
-    run_in(folder.path(), &[&again[..], &["--repeats", "2", "--max-particles", "600"]].concat());
+    done(&[&again[..], &["--repeats", "2", "--max-particles", "600"]].concat(), folder.path());
     let smaller = json_in(&here.join("trade.json"));
     let particles = |study: &serde_json::Value| {
         let points = study["points"].as_array().expect("points").iter();
@@ -234,7 +206,7 @@ fn a_trade_study_prints_what_is_cheapest_and_writes_every_setting() {
 fn an_accuracy_is_met_and_told() {
     let folder = temporary();
     let arguments = ["run", "beam-loaded", "--out", "here", "--set", "equilibrium.accuracy=1%"];
-    let said = run_in(folder.path(), &arguments);
+    let said = done(&arguments, folder.path());
     assert!(said.starts_with("accuracy 1 %: material rule at 0.5 of the written spacing"), "{said}");
 }
 
@@ -451,14 +423,12 @@ fn unknown_arguments_are_refused() {
 fn an_output_that_cannot_be_written_is_refused() {
     let folder = temporary();
     std::fs::write(folder.path().join("file"), "").expect("written");
-    let output = flockform(&["run", "tension", "--out", "file"], folder.path());
-    assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output.stderr).contains("is no folder"), "{}", text(&output.stderr));
+    refused_in(&["run", "tension", "--out", "file"], folder.path(), &["is no folder"]);
 }
 
 #[test]
 fn scenes_are_listed_with_a_line_each() {
-    let said = run_in(temporary().path(), &["list", "scenes"]);
+    let said = done(&["list", "scenes"], temporary().path());
     assert_eq!(said.lines().count(), flockform::scene::bundled::SCENES.len());
     assert!(said.lines().all(|line| line.split_whitespace().count() > 3), "{said}");
 }
@@ -466,12 +436,12 @@ fn scenes_are_listed_with_a_line_each() {
 #[test]
 fn a_plan_says_what_is_modelled_left_out_and_why() {
     let folder = temporary();
-    let said = run_in(folder.path(), &["plan", "fracture"]);
+    let said = done(&["plan", "fracture"], folder.path());
     for words in ["particles", "memory", "models", "fracture past df = 11 mm", "leaves out", "frame"] {
         assert!(said.contains(words), "no `{words}` in\n{said}");
     }
     assert!(files(folder.path()).is_empty());
-    let said = run_in(folder.path(), &["plan", "tension", "--set", "rule.mean={kind=\"distance\"}"]);
+    let said = done(&["plan", "tension", "--set", "rule.mean={kind=\"distance\"}"], folder.path());
     assert!(said.contains("caution") && said.contains("sequential"), "{said}");
 }
 
@@ -491,11 +461,11 @@ fn what_comes_after_the_last_step_is_warned_of_by_the_plan_and_the_run() {
     for command in
         [&["plan", "tension"][..], &["run", "tension", "--no-report", "--figures", "none", "--out", "o"]]
     {
-        let said = run_in(folder.path(), &[command, &set].concat());
+        let said = done(&[command, &set].concat(), folder.path());
         assert!(said.contains(words), "{said}");
     }
     let parts = ["--set", "load_steps={ increments = 4 }", "--set", "record.figures=[4, 5]"];
-    let said = run_in(folder.path(), &[&["plan", "elastica"][..], &parts].concat());
+    let said = done(&[&["plan", "elastica"][..], &parts].concat(), folder.path());
     assert!(
         said.contains("beyond the last increment, 4, and without effect: record.figures[1] = 5;"),
         "{said}"
@@ -516,7 +486,7 @@ fn cuts_that_miss_the_body_are_warned_of_by_the_plan_and_the_run() {
     let unless = "the cut of actions[1] where the body begins: without effect unless the body has moved there by step 3\n";
     let idle = "no bond crosses the cut of actions[1], which is without effect: lay it through the body\n";
     for (command, of_action) in [(&["plan", "tension"][..], unless), (&run[..], idle)] {
-        let said = run_in(folder.path(), &[command, &set].concat());
+        let said = done(&[command, &set].concat(), folder.path());
         assert!(said.contains("caution: no bond crosses cuts[1], which is without effect"), "{said}");
         assert!(said.contains(of_action), "{said}");
         assert!(!said.contains("cuts[0]") && !said.contains("actions[0]"), "{said}");
@@ -531,14 +501,14 @@ fn a_strain_that_is_not_defined_is_none() {
         motion = { kind = \"velocity\", per_step = [0.1, 0.0] } }]\n";
     let folder = temporary();
     std::fs::write(folder.path().join("row.toml"), ROW).expect("written");
-    let said = run_in(folder.path(), &["run", "row.toml", "--out", "o"]);
+    let said = done(&["run", "row.toml", "--out", "o"], folder.path());
     assert!(said.contains("strain not defined: no particle has neighbours in two directions\n"), "{said}");
     assert!(json_in(&folder.path().join("o/summary.json"))["energies"]["largest_strain"].is_null());
 }
 
 #[test]
 fn the_schema_is_json_and_knows_every_top_level_key() {
-    let schema = json(&run_in(temporary().path(), &["schema"]));
+    let schema = json(&done(&["schema"], temporary().path()));
     for key in
         ["lattice", "body", "frame", "neighbours", "rule", "update", "roles", "fracture", "stop", "record"]
     {
@@ -550,17 +520,17 @@ fn the_schema_is_json_and_knows_every_top_level_key() {
 fn completions_and_help_have_what_they_promise() {
     let folder = temporary();
     for shell in ["bash", "zsh", "fish"] {
-        assert!(run_in(folder.path(), &["completions", shell]).contains("flockform"));
+        assert!(done(&["completions", shell], folder.path()).contains("flockform"));
     }
     for command in ["run", "list", "plan", "schema", "completions", "material"] {
-        assert!(run_in(folder.path(), &[command, "--help"]).contains("Example"), "{command}");
+        assert!(done(&[command, "--help"], folder.path()).contains("Example"), "{command}");
     }
     for command in
         ["run", "compare", "trade", "sweep", "stability", "swarm", "live", "replay", "node", "robots"]
             .into_iter()
             .chain(["gallery", "list", "show", "new", "plan", "material", "install", "schema", "completions"])
     {
-        let help = run_in(folder.path(), &[command, "--help"]);
+        let help = done(&[command, "--help"], folder.path());
         let (_, examples) = help.split_once("\nExample").expect("there are some");
         let count = examples.split("\n\n").next().map_or(0, |lines| lines.matches("\n  flockform ").count());
         assert_eq!(examples.starts_with("s:"), count > 1, "{command}: {count} in {help}");
@@ -569,7 +539,7 @@ fn completions_and_help_have_what_they_promise() {
 
 #[test]
 fn the_bench_completes_and_its_json_is_valid() {
-    let said = run_in(temporary().path(), &["bench", "sweep", "--quick", "--json"]);
+    let said = done(&["bench", "sweep", "--quick", "--json"], temporary().path());
     let report = json(&said);
     assert!(report.is_object(), "{said}");
 }
@@ -577,7 +547,7 @@ fn the_bench_completes_and_its_json_is_valid() {
 #[cfg(feature = "swarm")]
 #[test]
 fn the_swarm_bench_says_in_json_what_a_tick_costs_and_how_long_a_target_takes() {
-    let said = run_in(temporary().path(), &["bench", "swarm", "--quick", "--json"]);
+    let said = done(&["bench", "swarm", "--quick", "--json"], temporary().path());
     let report = json(&said);
     for (list, keys) in [
         ("cases", &["robots", "rule_robots_per_millisecond", "safe_robots_per_millisecond"][..]),

@@ -7,9 +7,7 @@ const QUICK: [&str; 4] = ["stability", "tension", "--quick", "--no-extremes"];
 #[test]
 fn a_table_is_printed_and_the_results_stand_in_a_numbered_folder() {
     let folder = temporary();
-    let output = flockform(&QUICK, folder.path());
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let said = text(&output.stdout);
+    let said = done(&QUICK, folder.path());
     for words in ["grows beyond", "feedback factor (upper)", "0.006866", "delay", "tension-stability"] {
         assert!(said.contains(words), "{words}: {said}");
     }
@@ -46,9 +44,7 @@ fn what_cannot_be_asked_is_refused_with_exit_code_2_and_leaves_nothing() {
         (vec!["stability", "tension", "--set", "body.anchor=[1e20,0.0]"], "put the origin"),
         (vec!["stability", "tension", "--set", "lattice.spacing=1e-310"], "use another unit"),
     ] {
-        let output = flockform(&arguments, folder.path());
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-        assert!(text(&output.stderr).contains(words), "{words}: {}", text(&output.stderr));
+        refused_in(&arguments, folder.path(), &[words]);
     }
     assert!(!folder.path().join("out").exists());
 }
@@ -68,9 +64,7 @@ fn a_rule_that_changes_on_the_way_has_no_one_threshold() {
 fn a_rule_without_a_spectrum_says_so_and_runs_its_extremes() {
     let folder = temporary();
     let arguments = ["stability", "tension", "--set", "rule.mean={kind=\"distance\"}"];
-    let output = flockform(&arguments, folder.path());
-    let said = text(&output.stdout);
-    assert!(output.status.success(), "{said}{}", text(&output.stderr));
+    let said = done(&arguments, folder.path());
     assert!(said.contains("no thresholds") && said.contains("nonlinear"), "{said}");
     assert!(said.contains("0 wrong") && said.contains("coordinates times 1e150"), "{said}");
     assert!(!folder.path().join("out/tension-stability/growth.csv").exists());

@@ -1,25 +1,17 @@
 //! `flockform swarm`, `node` and `robots` as people call them.
 
 use std::fs::{read_dir, read_to_string, write};
-use std::process::Output;
 
 use flockform::swarm::control::scope::NodeScope;
 
 use crate::program::*;
 
-fn refused(output: &Output, words: &[&str], expected: &str) {
-    let said = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{words:?}: {said}");
-    assert!(said.contains(expected), "{words:?}: {said}");
-}
-
 #[test]
 fn a_swarm_is_flown_and_leaves_tables_and_figures() {
     let folder = temporary();
     let out = folder.path().join("out");
-    let output = flockform(&["swarm", "bridge", "--out", "out"], folder.path());
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    assert!(text(&output.stdout).contains("From the continuum run"), "{}", text(&output.stdout));
+    let said = done(&["swarm", "bridge", "--out", "out"], folder.path());
+    assert!(said.contains("From the continuum run"), "{said}");
     for file in
         ["flight.json", "samples.csv", "robots.csv", "tracks.csv", "flight.png", "flight.svg", "errors.png"]
     {
@@ -37,8 +29,7 @@ fn a_swarm_is_flown_and_leaves_tables_and_figures() {
 #[test]
 fn leaders_are_diamonds_on_the_map_and_in_its_legend() {
     let folder = temporary();
-    let output = flockform(&["swarm", "square", "--out", "out", "--no-report"], folder.path());
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    done(&["swarm", "square", "--out", "out", "--no-report"], folder.path());
     let map = read_to_string(folder.path().join("out/flight.svg")).expect("drawn");
     let group = |role: &str| {
         let (_, rest) = map.split_once(&format!("<g class=\"{role}\"")).expect("drawn");
@@ -67,8 +58,7 @@ fn the_map_clips_the_fence_and_draws_every_robot_to_scale() {
         [flight]\nduration = 1.0\n";
     let folder = temporary();
     write(folder.path().join("pair.toml"), PAIR).expect("written");
-    let output = flockform(&["swarm", "pair.toml", "--out", "out", "--no-report"], folder.path());
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    done(&["swarm", "pair.toml", "--out", "out", "--no-report"], folder.path());
     let map = read_to_string(folder.path().join("out/flight.svg")).expect("drawn");
     let (_, window) = map.split_once("<clipPath id=\"plot\">").expect("a window");
     let (_, clipped) = window.split_once("<g clip-path=\"url(#plot)\">").expect("something is clipped");
@@ -92,9 +82,7 @@ fn a_strain_that_is_not_defined_is_left_out() {
         flight = { duration = 2.0 }\n";
     let folder = temporary();
     write(folder.path().join("line.toml"), LINE).expect("written");
-    let output = flockform(&["swarm", "line.toml", "--out", "out"], folder.path());
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let said = text(&output.stdout);
+    let said = done(&["swarm", "line.toml", "--out", "out"], folder.path());
     assert!(said.contains("not defined: no robot has neighbours in two directions"), "{said}");
     assert!(json_in(&folder.path().join("out/flight.json"))["strain"].is_null());
     let samples = read_to_string(folder.path().join("out/samples.csv")).expect("written");
@@ -107,9 +95,8 @@ fn a_strain_that_is_not_defined_is_left_out() {
 fn a_broken_bound_ends_with_exit_code_1_and_all_is_written() {
     let folder = temporary();
     let set = "flight.bounds={ final_error = 1e-30, clearance = 5.0 }";
-    let output = flockform(&["swarm", "square", "--set", set, "--out", "out"], folder.path());
-    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
-    assert!(text(&output.stdout).contains("BROKEN: declared 5"), "{}", text(&output.stdout));
+    let said = failed(&["swarm", "square", "--set", set, "--out", "out"], folder.path());
+    assert!(said.contains("BROKEN: declared 5"), "{said}");
     assert!(folder.path().join("out/flight.json").is_file());
 }
 
@@ -133,8 +120,7 @@ fn what_cannot_fly_is_refused_with_exit_code_2_and_nothing_is_left() {
         ),
     ];
     for (words, expected) in cases {
-        let output = flockform(&[words, &["--out", "out"]].concat(), folder.path());
-        refused(&output, words, expected);
+        refused_in(&[words, &["--out", "out"]].concat(), folder.path(), &[expected]);
     }
     assert_eq!(read_dir(folder.path()).expect("a folder").count(), 0);
 }
@@ -158,7 +144,7 @@ fn nodes_refuse_what_ros_cannot_mean() {
         (&["run", "tension", "--ros-args", "-r", "a:=b"], "this command is no ROS 2 node"),
     ];
     for (words, expected) in cases {
-        refused(&flockform(words, folder.path()), words, expected);
+        refused_in(words, folder.path(), &[expected]);
     }
 }
 

@@ -1,29 +1,10 @@
 //! `flockform sweep`: the table and whatever must not change it.
 
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::Child;
 use std::time::{Duration, Instant};
 
 use crate::program::*;
-
-fn said(arguments: &[&str], folder: &Path) -> String {
-    let output = flockform(arguments, folder);
-    assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
-    text(&output.stdout)
-}
-
-fn refused(arguments: &[&str], words: &[&str]) {
-    let folder = temporary();
-    let output = flockform(arguments, folder.path());
-    let why = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {why}");
-    words.iter().for_each(|word| assert!(why.contains(word), "{arguments:?} does not say `{word}`: {why}"));
-    assert!(files(folder.path()).is_empty(), "{arguments:?}: {:?}", files(folder.path()));
-}
-
-fn read(path: impl AsRef<Path>) -> String {
-    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.as_ref().display()))
-}
 
 /// The cells of a table, its head first.
 fn table(path: impl AsRef<Path>) -> Vec<Vec<String>> {
@@ -38,7 +19,7 @@ const VARY: [&str; 4] = ["--vary", "update.damping=0.5:1:3", "--vary", "stop.ste
 fn a_sweep_has_the_numbers_of_single_runs() {
     let folder = temporary();
     let outputs = "energies.pe1,steps,probe.67.ux@20,probe.67.x";
-    said(&[&["sweep", "tension", "--outputs", outputs, "--out", "o"], &VARY[..]].concat(), folder.path());
+    done(&[&["sweep", "tension", "--outputs", outputs, "--out", "o"], &VARY[..]].concat(), folder.path());
     let rows = table(folder.path().join("o/sweep.csv"));
     assert_eq!(
         rows[0].join(","),
@@ -49,7 +30,7 @@ fn a_sweep_has_the_numbers_of_single_runs() {
     assert_eq!(varied, ["0.5 20", "0.5 40", "0.75 20", "0.75 40", "1 20", "1 40"]);
     let set = ["--set", "update.damping=0.75", "--set", "stop.steps=40"];
     let run = ["run", "tension", "-q", "--figures", "none", "--no-report", "--out", "single"];
-    said(&[&run[..], &set].concat(), folder.path());
+    done(&[&run[..], &set].concat(), folder.path());
     let (summary, single) = (read(folder.path().join("single/summary.json")), &rows[4]);
     assert!(summary.contains(&format!("\"pe1\": {},", single[3])), "{single:?} {summary}");
     assert_eq!((single[4].as_str(), single[7].as_str()), ("40", "steps"));
@@ -69,7 +50,7 @@ fn threads_and_shards_do_not_change_a_byte_of_the_table() {
     let folder = temporary();
     let sweep = |more: &[&str]| {
         let common = ["sweep", "tension", "--figures", "none", "-q"];
-        said(&[&common[..], &VARY, more].concat(), folder.path())
+        done(&[&common[..], &VARY, more].concat(), folder.path())
     };
     sweep(&["--out", "one", "--threads", "1"]);
     sweep(&["--out", "many", "--threads", "5"]);
@@ -82,7 +63,7 @@ fn threads_and_shards_do_not_change_a_byte_of_the_table() {
     let parts = parts.map(|part| format!("out/{part}"));
     assert_eq!(table(folder.path().join(&parts[1]).join("sweep.csv")).len(), 3, "a head and two of six");
     // In any order.
-    said(&["sweep", "--merge", &parts[2], &parts[0], &parts[1], "--out", "all", "-q"], folder.path());
+    done(&["sweep", "--merge", &parts[2], &parts[0], &parts[1], "--out", "all", "-q"], folder.path());
     assert_eq!(read(folder.path().join("all/sweep.csv")), one);
     // Without one it says so, and the rest can be made.
     let output = flockform(&["sweep", "--merge", &parts[0], &parts[2], "--out", "two"], folder.path());
@@ -93,7 +74,7 @@ fn threads_and_shards_do_not_change_a_byte_of_the_table() {
         text(&output.stderr)
     );
     assert_eq!(table(folder.path().join("two/sweep.csv")).len(), 5);
-    said(&["sweep", "--resume", "two", "-q"], folder.path());
+    done(&["sweep", "--resume", "two", "-q"], folder.path());
     assert_eq!(read(folder.path().join("two/sweep.csv")), one);
     // As if that had been killed before its last run: it goes on into the place of the merged runs.
     let (two, unfinished) = (folder.path().join("two"), folder.path().join("two.unfinished"));
@@ -104,12 +85,14 @@ fn threads_and_shards_do_not_change_a_byte_of_the_table() {
     let rows = read(two.join("runs.jsonl"));
     let kept: Vec<&str> = rows.split_inclusive('\n').take(5).collect();
     std::fs::write(unfinished.join("runs.jsonl"), kept.concat()).expect("writable");
-    said(&["sweep", "--resume", "two", "-q"], folder.path());
+    done(&["sweep", "--resume", "two", "-q"], folder.path());
     assert_eq!(read(two.join("sweep.csv")), one);
     sweep(&["--out", "other", "--set", "lattice.spacing=2.0"]);
-    let output = flockform(&["sweep", "--merge", "one", "other", "--out", "none"], folder.path());
-    assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output.stderr).contains("not parts of one sweep"), "{}", text(&output.stderr));
+    refused_in(
+        &["sweep", "--merge", "one", "other", "--out", "none"],
+        folder.path(),
+        &["not parts of one sweep"],
+    );
     assert!(!folder.path().join("none").exists());
 }
 
@@ -120,7 +103,7 @@ fn samples_are_those_of_their_seed() {
         let arguments =
             ["sweep", "tension", "--vary", "update.damping=0.1:1", "--samples", "8", "--seed", seed];
         let more = ["--sampling", sampling, "--set", "stop.steps=5", "--figures", "none", "-q", "--out", out];
-        said(&[&arguments[..], &more].concat(), folder.path());
+        done(&[&arguments[..], &more].concat(), folder.path());
         read(folder.path().join(out).join("sweep.csv"))
     };
     let first = draw("1", "latin-hypercube", "a");
@@ -139,13 +122,12 @@ fn samples_are_those_of_their_seed() {
 fn runs_that_the_scene_refuses_are_rows_that_say_why() {
     let folder = temporary();
     let arguments = ["sweep", "tension", "--vary", "update.damping=[0.5, -1, 1]", "--set", "stop.steps=5"];
-    let output = flockform(&[&arguments[..], &["--out", "o", "--json"]].concat(), folder.path());
-    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    let said = failed(&[&arguments[..], &["--out", "o", "--json"]].concat(), folder.path());
     let rows = table(folder.path().join("o/sweep.csv"));
     let ended: Vec<&str> = rows[1..].iter().map(|row| row[row.len() - 2].as_str()).collect();
     assert_eq!(ended, ["steps", "refused", "steps"]);
     assert!(rows[2].last().is_some_and(|reason| reason.contains("update.damping")), "{rows:?}");
-    let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let json = json(&said);
     assert_eq!(
         (json[1]["update.damping"].as_f64(), json[1]["stop_reason"].as_str()),
         (Some(-1.0), Some("refused"))
@@ -191,7 +173,7 @@ fn the_last_line_says_how_the_runs_ended() {
     let folder = temporary();
     let of = |more: &[&str]| {
         let sweep = ["sweep", "tension", "--vary", "update.damping=[0.5, 0.8]", "--figures", "none"];
-        said(&[&sweep[..], more].concat(), folder.path())
+        done(&[&sweep[..], more].concat(), folder.path())
     };
     let words = of(&["--set", "stop.steps=3"]);
     assert!(words.contains("tension: 2 runs, all ended at stop.steps, "), "{words}");
@@ -209,7 +191,7 @@ fn twenty_runs_of_tension_take_a_moment() {
     let took = (0..3).map(|n| {
         let start = Instant::now();
         let out = format!("o{n}");
-        said(&["sweep", "tension", "--vary", "update.damping=0.5:1:20", "-q", "--out", &out], folder.path());
+        done(&["sweep", "tension", "--vary", "update.damping=0.5:1:20", "-q", "--out", &out], folder.path());
         start.elapsed()
     });
     let took = took.min().expect("three times");
@@ -220,47 +202,37 @@ fn twenty_runs_of_tension_take_a_moment() {
 const LONG: [&str; 7] =
     ["sweep", "tension", "--vary", "update.damping=0.5:1:40", "--set", "stop.steps=100000", "-q"];
 
-fn start(folder: &Path) -> Child {
-    Command::new(env!("CARGO_BIN_EXE_flockform"))
-        .args(LONG)
-        .args(["--out", "o", "--figures", "none", "--threads", "1"])
-        .current_dir(folder)
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the program starts")
-}
-
-/// Waits until some runs have ended, and not all.
-fn wait_for_rows(folder: &Path) {
+/// A sweep of which some runs have ended, and not all.
+fn begun(folder: &Path) -> Child {
+    let more = ["--out", "o", "--figures", "none", "--threads", "1"];
+    let child = start(&[&LONG[..], &more].concat(), folder);
     let journal = folder.join("o.unfinished/runs.jsonl");
     within(Duration::from_secs(120), "some runs have ended", || {
         let rows = std::fs::read_to_string(&journal).unwrap_or_default();
         (rows.lines().count() >= 3).then_some(())
     });
+    child
 }
 
 /// The table of an uninterrupted sweep.
 fn undisturbed(folder: &Path) -> String {
-    said(&[&LONG[..], &["--out", "whole", "--figures", "none"]].concat(), folder);
+    done(&[&LONG[..], &["--out", "whole", "--figures", "none"]].concat(), folder);
     read(folder.join("whole/sweep.csv"))
 }
 
 #[test]
 fn a_killed_sweep_goes_on_with_the_runs_that_had_not_ended() {
     let folder = temporary();
-    let mut child = start(folder.path());
-    wait_for_rows(folder.path());
+    let mut child = begun(folder.path());
     signal("KILL", child.id());
     assert!(!child.wait().expect("a child").success(), "it was killed before its end");
     let journal = folder.path().join("o.unfinished/runs.jsonl");
     let kept = read(&journal);
     // As a power cut might leave it.
     std::fs::write(&journal, format!("{kept}{{\"run\":39,\"stop_re")).expect("writable");
-    let again =
-        flockform(&["sweep", "tension", "--vary", "update.damping=0.5:1:2", "--out", "o"], folder.path());
-    assert_eq!(again.status.code(), Some(2));
-    assert!(text(&again.stderr).contains("flockform sweep --resume"), "{}", text(&again.stderr));
-    said(&["sweep", "--resume", "o", "-q", "--figures", "none"], folder.path());
+    let again = ["sweep", "tension", "--vary", "update.damping=0.5:1:2", "--out", "o"];
+    refused_in(&again, folder.path(), &["flockform sweep --resume"]);
+    done(&["sweep", "--resume", "o", "-q", "--figures", "none"], folder.path());
     assert!(!folder.path().join("o.unfinished").exists());
     let all = read(folder.path().join("o/runs.jsonl"));
     assert!(all.starts_with(&kept), "the runs that had ended were not made again");
@@ -271,8 +243,7 @@ fn a_killed_sweep_goes_on_with_the_runs_that_had_not_ended() {
 #[test]
 fn ctrl_c_ends_a_sweep_soon_and_keeps_its_rows() {
     let folder = temporary();
-    let child = start(folder.path());
-    wait_for_rows(folder.path());
+    let child = begun(folder.path());
     let since = Instant::now();
     signal("INT", child.id());
     let output = child.wait_with_output().expect("a child");
@@ -282,21 +253,19 @@ fn ctrl_c_ends_a_sweep_soon_and_keeps_its_rows() {
     assert!(words.contains("interrupted: `flockform sweep --resume"), "{words}");
     assert!(!folder.path().join("o").exists());
     assert!(read(folder.path().join("o.unfinished/runs.jsonl")).lines().count() >= 3);
-    said(&["sweep", "--resume", "o.unfinished", "-q", "--figures", "none"], folder.path());
+    done(&["sweep", "--resume", "o.unfinished", "-q", "--figures", "none"], folder.path());
     assert_eq!(read(folder.path().join("o/sweep.csv")), undisturbed(folder.path()));
 }
 
 #[test]
 fn runs_of_a_scene_that_has_changed_are_not_gone_on_with() {
     let folder = temporary();
-    said(&["new", "scene", "mine"], folder.path());
+    done(&["new", "scene", "mine"], folder.path());
     let arguments = ["sweep", "mine.toml", "--vary", "update.damping=0.5:1:4", "--shard", "1/2", "-q"];
-    said(&[&arguments[..], &["--out", "o", "--figures", "none"]].concat(), folder.path());
+    done(&[&arguments[..], &["--out", "o", "--figures", "none"]].concat(), folder.path());
     let path = folder.path().join("mine.toml");
     std::fs::write(&path, read(&path).replace("steps = 401", "steps = 40")).expect("writable");
-    let output = flockform(&["sweep", "--resume", "o"], folder.path());
-    assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output.stderr).contains("are of another"), "{}", text(&output.stderr));
+    refused_in(&["sweep", "--resume", "o"], folder.path(), &["are of another"]);
     assert_eq!(table(folder.path().join("o/sweep.csv")).len(), 3);
 }
 
@@ -329,33 +298,26 @@ fn runs_of_a_body_whose_points_have_changed_are_not_put_together() {
     std::fs::write(folder.path().join("mine.toml"), POINTS).expect("writable");
     let shard = |part: &str, out: &str| {
         let arguments = ["sweep", "mine.toml", "--vary", "update.damping=0.5:1:4", "--figures", "none", "-q"];
-        said(&[&arguments[..], &["--shard", part, "--out", out]].concat(), folder.path());
+        done(&[&arguments[..], &["--shard", part, "--out", out]].concat(), folder.path());
     };
     std::fs::write(&place, points(3.0)).expect("writable");
     shard("1/2", "a");
     shard("2/2", "b");
-    said(&["sweep", "--merge", "a", "b", "--out", "both", "--figures", "none", "-q"], folder.path());
+    done(&["sweep", "--merge", "a", "b", "--out", "both", "--figures", "none", "-q"], folder.path());
     std::fs::write(&place, points(3.1)).expect("writable");
     shard("2/2", "c");
-    let merged = flockform(&["sweep", "--merge", "a", "c", "--out", "none"], folder.path());
-    assert_eq!(merged.status.code(), Some(2));
-    assert!(text(&merged.stderr).contains("not parts of one sweep"), "{}", text(&merged.stderr));
-    let resumed = flockform(&["sweep", "--resume", "a"], folder.path());
-    assert_eq!(resumed.status.code(), Some(2));
-    assert!(text(&resumed.stderr).contains("of another body"), "{}", text(&resumed.stderr));
+    refused_in(&["sweep", "--merge", "a", "c", "--out", "none"], folder.path(), &["not parts of one sweep"]);
+    refused_in(&["sweep", "--resume", "a"], folder.path(), &["of another body"]);
 }
 
 /// A finished sweep of two runs in `o`.
 fn finished(folder: &Path) {
     let arguments = ["sweep", "tension", "--vary", "update.damping=0.5:1:2", "--set", "stop.steps=2", "-q"];
-    said(&[&arguments[..], &["--out", "o", "--figures", "none"]].concat(), folder);
+    done(&[&arguments[..], &["--out", "o", "--figures", "none"]].concat(), folder);
 }
 
 fn not_resumed(folder: &Path, words: &[&str]) {
-    let output = flockform(&["sweep", "--resume", "o"], folder);
-    let why = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{why}");
-    words.iter().for_each(|word| assert!(why.contains(word), "no `{word}` in {why}"));
+    refused_in(&["sweep", "--resume", "o"], folder, words);
 }
 
 #[test]

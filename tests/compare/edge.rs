@@ -7,10 +7,10 @@ use flockform::continuum::mechanics::{Mechanics, Stresses};
 use flockform::continuum::places::at_places;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::report::PlanReport;
-use flockform::fem::Effort;
 use flockform::scene::Scene;
 use flockform::solve::equilibrium::Solver;
-use flockform::study::compare::run::compare;
+
+use crate::support::compare_scene;
 
 fn scene(text: &str, overrides: &[&str]) -> Scene {
     let overrides: Vec<String> = overrides.iter().map(|&text| text.to_owned()).collect();
@@ -236,8 +236,7 @@ fn pressure_on_a_body_that_turns_is_said_to_keep_its_direction() {
 
 #[test]
 fn a_comparison_has_the_energy_of_the_truth_itself() {
-    let scene = scene(BENT, &["lattice.spacing=0.5"]);
-    let found = compare(&scene, &Effort::default(), &mut |_, _| ControlFlow::Continue(()));
+    let found = compare_scene(&scene(BENT, &["lattice.spacing=0.5"]));
     let found = found.unwrap_or_else(|error| panic!("{error}")).comparison;
     // M^2 L / (2 E I).
     let exact = 10.0 / (2.0 * 1000.0 / 12.0);

@@ -1,15 +1,12 @@
 //! What cannot be compared is refused by the key of the scene.
 
-use std::ops::ControlFlow;
-
-use flockform::fem::Effort;
-use flockform::study::compare::run::{compare, plan};
+use flockform::study::compare::run::plan;
 
 use crate::scenes::load;
+use crate::support::compare_scene;
 
 fn refused(name: &str, overrides: &[&str], words: &[&str]) {
-    let scene = load(name, overrides);
-    let outcome = compare(&scene, &Effort::default(), &mut |_, _| ControlFlow::Continue(()));
+    let outcome = compare_scene(&load(name, overrides));
     let said = outcome.err().unwrap_or_else(|| panic!("{name} {overrides:?} is compared")).to_string();
     for word in words {
         assert!(said.contains(word), "{name} {overrides:?} does not say `{word}`:\n{said}");

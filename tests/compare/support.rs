@@ -8,6 +8,7 @@ use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::vectors::Vectors;
 use flockform::material::cells::{Cells, neighbourhood};
 use flockform::material::elastic::{Constants, Elastic, Plane};
+use flockform::scene::{Scene, SceneError};
 use flockform::study::compare::run::{Compared, compare};
 
 pub use crate::samples::{KINDS, fibres, of_whole_cells};
@@ -32,9 +33,12 @@ pub fn largest_difference(a: &Vectors, b: &Vectors) -> f64 {
     a.iter().zip(b.iter()).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max)
 }
 
-/// What the rule of a bundled scene makes of its body, with changes.
+/// What the rule of a scene makes of its body.
+pub fn compare_scene(scene: &Scene) -> Result<Compared, SceneError> {
+    compare(scene, &Effort::default(), &mut |_, _| ControlFlow::Continue(()))
+}
+
+/// The same of a bundled scene with changes.
 pub fn compared(name: &str, overrides: &[&str]) -> Compared {
-    let scene = load(name, overrides);
-    compare(&scene, &Effort::default(), &mut |_, _| ControlFlow::Continue(()))
-        .unwrap_or_else(|e| panic!("{e}"))
+    compare_scene(&load(name, overrides)).unwrap_or_else(|e| panic!("{e}"))
 }

@@ -1,11 +1,9 @@
 //! The truth is that of the shape: the same whatever lattice stands on it, and that of closed forms.
 
-use std::ops::ControlFlow;
-
 use flockform::fem::Effort;
 use flockform::flock::vectors::Vectors;
 use flockform::study::compare::measures::Comparison;
-use flockform::study::compare::run::{SceneReference, compare, reference_of};
+use flockform::study::compare::run::{SceneReference, reference_of};
 use flockform::study::compare::split::ErrorParts;
 
 use crate::scenes::load;
@@ -99,9 +97,7 @@ fn cooks_membrane_has_the_published_displacement_in_truth() {
 }
 
 fn measured(overrides: &[&str]) -> Comparison {
-    let scene = load("beam-loaded", overrides);
-    let found = compare(&scene, &Effort::default(), &mut |_, _| ControlFlow::Continue(()));
-    let found = found.unwrap_or_else(|e| panic!("{e}")).comparison;
+    let found = compared("beam-loaded", overrides).comparison;
     println!("{overrides:?}\n{found}");
     found
 }

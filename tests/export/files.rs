@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -21,7 +21,7 @@ use crate::json::json;
 use crate::scenes::{load, planned};
 
 /// A finished run with what was kept of it.
-struct Run {
+pub struct Run {
     scene: Scene,
     outcome: Outcome,
     snapshots: Vec<Snapshot>,
@@ -29,7 +29,7 @@ struct Run {
 }
 
 impl Run {
-    fn of(name: &str, overrides: &[&str]) -> Self {
+    pub fn of(name: &str, overrides: &[&str]) -> Self {
         let scene = load(name, overrides);
         let plan = planned(&scene);
         let mut probes: Vec<_> = plan.probes.iter().map(|&p| ProbeSeries::new(p)).collect();
@@ -51,6 +51,11 @@ impl Run {
     /// Writes everything to a folder of this name and commits it.
     fn write_to(&self, out: &Path) -> Result<(), ExportError> {
         let folder = OutputFolder::create(out, true)?;
+        self.write_into(&folder)?;
+        folder.commit().map(|_| ())
+    }
+
+    pub fn write_into(&self, folder: &OutputFolder) -> Result<(), ExportError> {
         let results = Results {
             scene: &self.scene,
             outcome: &self.outcome,
@@ -59,16 +64,25 @@ impl Run {
             load_steps: &[],
             timings: Timings::default(),
         };
-        let (written, _) = write_all(&folder, &results, Drawing::default())?;
+        let (written, _) = write_all(folder, &results, Drawing::default())?;
         assert!(written.iter().all(|path| path.is_file()), "{written:?}");
-        folder.commit().map(|_| ())
+        Ok(())
+    }
+
+    /// The list of frames and its files, of which there is one of the last step, in a folder of this parent.
+    fn frame(&self, parent: &Path) -> (OutputFolder, Vec<PathBuf>) {
+        let folder = OutputFolder::create(&parent.join("out"), false).expect("created");
+        let mut series = VtkSeries::create(&folder).expect("created");
+        series.write(&self.outcome.engine).expect("written");
+        let files = series.finish().expect("finished");
+        (folder, files)
     }
 }
 
 /// The list of what flockform wrote.
-const LIST: &str = "flockform-files.txt";
+pub const LIST: &str = "flockform-files.txt";
 
-fn fill(folder: &OutputFolder, file: &str) {
+pub fn fill(folder: &OutputFolder, file: &str) {
     fs::write(folder.path(file), r#"{"program": "flockform"}"#).expect("writable");
 }
 
@@ -260,11 +274,7 @@ fn a_frame_holds_every_particle_and_every_bond_with_its_state() {
     let parent = temporary();
     let run = Run::of("notched-plate", &["stop.steps=30", "record.figures=[]"]);
     let engine = &run.outcome.engine;
-    let folder = OutputFolder::create(&parent.path().join("out"), false).expect("created");
-    let mut series = VtkSeries::create(&folder).expect("created");
-    series.write(engine).expect("written");
-    let files = series.finish().expect("finished");
-
+    let (folder, files) = run.frame(parent.path());
     let text = fs::read_to_string(folder.path("steps/step_000030.vtu")).expect("readable");
     let document = Document::parse(&text).expect("well-formed");
     let piece = document.descendants().find(|node| node.has_tag_name("Piece")).expect("a piece");
@@ -305,21 +315,12 @@ fn a_frame_holds_every_particle_and_every_bond_with_its_state() {
     assert!(folder.path(entry.attribute("file").expect("a file")).is_file());
 }
 
-/// The last frame of a run by this scene, as text.
-fn last_frame(run: &Run, parent: &Path) -> String {
-    let engine = &run.outcome.engine;
-    let folder = OutputFolder::create(&parent.join("out"), false).expect("created");
-    let mut series = VtkSeries::create(&folder).expect("created");
-    series.write(engine).expect("written");
-    let files = series.finish().expect("finished");
-    fs::read_to_string(&files[1]).expect("readable")
-}
-
 #[test]
 fn a_frame_of_a_material_has_its_cells_filled_with_stress() {
     let parent = temporary();
     let run = Run::of("beam-loaded", &["lattice={kind=\"hexagonal\",spacing=1.0}"]);
-    let text = last_frame(&run, parent.path());
+    let (_folder, files) = run.frame(parent.path());
+    let text = fs::read_to_string(&files[1]).expect("readable");
     let document = Document::parse(&text).expect("well-formed");
     let piece = document.descendants().find(|node| node.has_tag_name("Piece")).expect("a piece");
     let cells = run.outcome.engine.cells().expect("a material");
@@ -342,7 +343,8 @@ fn a_frame_of_a_material_has_its_cells_filled_with_stress() {
 fn a_frame_of_the_paper_s_rule_with_a_material_has_particles_bonds_and_cells() {
     let parent = temporary();
     let run = Run::of("grips", &["stop.steps=1", "rule={}"]);
-    let text = last_frame(&run, parent.path());
+    let (_folder, files) = run.frame(parent.path());
+    let text = fs::read_to_string(&files[1]).expect("readable");
     let document = Document::parse(&text).expect("well-formed");
     let piece = document.descendants().find(|node| node.has_tag_name("Piece")).expect("a piece");
     let types: Vec<u8> = array::<1>(piece, "types").into_iter().flatten().collect();

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use crate::command::{command, flockform, text};
+use crate::command::{assert_refused, command, done, failed, refused_in, text};
 use crate::folders::{names_in, temporary};
 
 const STEPS: usize = 26;
@@ -125,17 +125,20 @@ fn particles(path: &Path) -> Vec<Particle> {
     .collect()
 }
 
-fn filmed(folder: &Path, more: &[&str]) -> std::process::Output {
+/// The command that films the sheet, which is written to a folder.
+fn sheet<'a>(folder: &Path, more: &[&'a str]) -> Vec<&'a str> {
     std::fs::write(folder.join("sheet.toml"), SHEET).expect("writable");
-    flockform(&[&["run", "sheet.toml", "--out", "o", "--figures", "none"], more].concat(), folder)
+    [&["run", "sheet.toml", "--out", "o", "--figures", "none"], more].concat()
+}
+
+fn filmed(folder: &Path, more: &[&str]) -> String {
+    done(&sheet(folder, more), folder)
 }
 
 #[test]
 fn each_frame_shows_the_particles_in_their_places_and_in_the_colours_of_their_displacements() {
     let folder = temporary();
-    let output = filmed(folder.path(), &["--film", "sheet.gif"]);
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let said = text(&output.stdout);
+    let said = filmed(folder.path(), &["--film", "sheet.gif"]);
     assert!(said.contains(&format!("film of {} frames", STEPS + 1)) && said.contains("GIF"), "{said}");
     let frames = decoded(&folder.path().join("sheet.gif"));
     assert_eq!(frames.len(), STEPS + 1);
@@ -174,8 +177,9 @@ fn each_frame_shows_the_particles_in_their_places_and_in_the_colours_of_their_di
 fn a_film_of_a_flight_ends_with_the_robots_in_their_last_places() {
     let folder = temporary();
     let arguments = ["swarm", "square", "--set", "flight.duration=3.0", "--out", "o", "--film", "square.gif"];
-    let output = flockform(&arguments, folder.path());
-    assert!(text(&output.stdout).contains("film of"), "{}", text(&output.stderr));
+    // So short a flight breaks a bound.
+    let said = failed(&arguments, folder.path());
+    assert!(said.contains("film of"), "{said}");
     let frames = decoded(&folder.path().join("square.gif"));
     let count =
         |picture: &Picture, colour: Colour| picture.pixels.iter().filter(|&&one| one == colour).count();
@@ -209,30 +213,19 @@ fn what_cannot_become_a_film_is_refused_before_the_run() {
         (&["--film-colour", "pe1"], "--film"),
     ];
     for (more, word) in refusals {
-        let output = filmed(folder.path(), more);
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{more:?}: {said}");
-        assert!(said.contains(word), "{more:?}: {said}");
+        refused_in(&sheet(folder.path(), more), folder.path(), &[word]);
         assert_eq!(names_in(folder.path()), ["notes.gif", "sheet.toml"], "{more:?}");
     }
-    let output = flockform(&["swarm", "square", "--film", "a.gif", "--film-colour", "pe2"], folder.path());
-    let said = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{said}");
-    assert!(
-        said.contains(
-            "possible values: role, displacement, clearance, away, speed, acceleration, pe1, strain"
-        ),
-        "{said}"
-    );
+    let colours = "possible values: role, displacement, clearance, away, speed, acceleration, pe1, strain";
+    let film = ["swarm", "square", "--film", "a.gif", "--film-colour", "pe2"];
+    refused_in(&film, folder.path(), &[colours]);
 }
 
 #[test]
 fn a_film_of_a_tall_body_is_no_higher_than_a_screen() {
     let folder = temporary();
     let shape = "body.shape={ kind = \"grid\", columns = 4, rows = 60 }";
-    let output =
-        filmed(folder.path(), &["--film", "sheet.gif", "--set", shape, "--steps", "2", "--no-report"]);
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    filmed(folder.path(), &["--film", "sheet.gif", "--set", shape, "--steps", "2", "--no-report"]);
     let film = decoded(&folder.path().join("sheet.gif"));
     let (width, height) = (film[0].0.width, film[0].0.height);
     assert!(height < 720 && width > 400, "{width} x {height}");
@@ -244,9 +237,7 @@ fn a_video_without_ffmpeg_is_refused_before_the_run() {
     for film in ["tension.mp4", "tension.webm"] {
         let mut command = command(&["run", "tension", "--out", "o", "--film", film], folder.path());
         let output = command.env("PATH", folder.path()).output().expect("the program starts");
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{said}");
-        assert!(said.contains("install ffmpeg") && said.contains(".gif"), "{said}");
+        assert_refused(&output, film, &["install ffmpeg", ".gif"]);
         assert_eq!(names_in(folder.path()), [""; 0]);
     }
 }
@@ -254,13 +245,11 @@ fn a_video_without_ffmpeg_is_refused_before_the_run() {
 #[test]
 fn force_replaces_a_film_and_the_report_may_be_left_out() {
     let folder = temporary();
-    let output = filmed(folder.path(), &["--film", "sheet.gif", "--no-report", "--quiet"]);
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    assert!(output.stdout.is_empty(), "{}", text(&output.stdout));
+    let said = filmed(folder.path(), &["--film", "sheet.gif", "--no-report", "--quiet"]);
+    assert!(said.is_empty(), "{said}");
     assert!(!folder.path().join("o/report.html").exists());
     let film = std::fs::read(folder.path().join("sheet.gif")).expect("a film");
-    let again = filmed(folder.path(), &["--film", "sheet.gif", "--film-colour", "pe1", "--force"]);
-    assert!(again.status.success(), "{}", text(&again.stderr));
+    filmed(folder.path(), &["--film", "sheet.gif", "--film-colour", "pe1", "--force"]);
     assert_ne!(film, std::fs::read(folder.path().join("sheet.gif")).expect("a film"));
     assert_eq!(names_in(folder.path()), ["o", "sheet.gif", "sheet.toml"]);
 }
@@ -297,10 +286,11 @@ fn filmed_by(script: &str, folder: &Path) -> std::process::Output {
     let ffmpeg = programs.join("ffmpeg");
     std::fs::write(&ffmpeg, format!("#!/bin/sh\n{listed}\n{script}\n")).expect("writable");
     std::fs::set_permissions(&ffmpeg, std::fs::Permissions::from_mode(0o755)).expect("ours");
-    std::fs::write(folder.join("sheet.toml"), SHEET).expect("writable");
-    let arguments = ["run", "sheet.toml", "--out", "o", "--figures", "none", "--film", "sheet.mp4"];
     let path = format!("{}:/usr/bin:/bin", programs.display());
-    command(&arguments, folder).env("PATH", path).output().expect("the program starts")
+    command(&sheet(folder, &["--film", "sheet.mp4"]), folder)
+        .env("PATH", path)
+        .output()
+        .expect("the program starts")
 }
 
 #[cfg(unix)]
@@ -345,8 +335,8 @@ fn an_encoder_that_fails_leaves_the_results_and_no_film() {
 fn ffmpeg_makes_videos_that_show_the_frames() {
     let folder = temporary();
     for film in ["sheet.mp4", "sheet.webm"] {
-        let output = filmed(folder.path(), &["--film", film, "--force"]);
-        assert!(text(&output.stdout).contains("by ffmpeg"), "{}", text(&output.stderr));
+        let said = filmed(folder.path(), &["--film", film, "--force"]);
+        assert!(said.contains("by ffmpeg"), "{said}");
         let probe = std::process::Command::new("ffprobe")
             .args(["-v", "error", "-count_frames", "-show_entries", "stream=nb_read_frames,width,height"])
             .args(["-of", "csv=p=0", film])

@@ -1,22 +1,12 @@
 //! Whose files an output folder holds, and what becomes of them: `--force` removes what flockform wrote and nothing else.
 
 use std::fs;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use flockform::continuum::record::{ProbeSeries, Snapshot};
-use flockform::continuum::run::run;
-use flockform::export::{Drawing, ExportError, OutputFolder, Results, Timings, VtkSeries, write_all};
+use flockform::export::{ExportError, OutputFolder, VtkSeries};
 
+use crate::files::{LIST, Run, fill};
 use crate::folders::{names_in, temporary};
-use crate::scenes::{load, planned};
-
-/// The list of what flockform wrote.
-const LIST: &str = "flockform-files.txt";
-
-fn fill(folder: &OutputFolder, file: &str) {
-    fs::write(folder.path(file), "{}").expect("writable");
-}
 
 /// Everything below a folder, folders included, links not followed.
 fn files(folder: &Path) -> Vec<PathBuf> {
@@ -160,25 +150,8 @@ fn nothing_is_written_through_a_link() {
         let _ = fs::remove_file(open.join(name));
         std::os::unix::fs::symlink(&victim, open.join(name)).expect("linked");
     }
-    let scene = load("tension", &["stop.steps=25"]);
-    let mut probes = [ProbeSeries::new(66)];
-    let mut snapshots = Vec::new();
-    let outcome = run(planned(&scene), &mut |engine, _| {
-        probes[0].record(engine);
-        if engine.step() == 25 {
-            snapshots.push(Snapshot::of(engine));
-        }
-        ControlFlow::Continue(())
-    });
-    let results = Results {
-        scene: &scene,
-        outcome: &outcome,
-        snapshots: &snapshots,
-        probes: &probes,
-        load_steps: &[],
-        timings: Timings::default(),
-    };
-    write_all(&folder, &results, Drawing::default()).expect("written");
+    let run = Run::of("tension", &["stop.steps=25", "record.figures=[25]"]);
+    run.write_into(&folder).expect("written");
     VtkSeries::create(&folder).expect("created").finish().expect("written");
     folder.commit().expect("committed");
     assert_eq!(fs::read_to_string(&victim).expect("there"), "mine");

@@ -251,6 +251,13 @@ fn assert_near(found: [f32; 2], expected: [f32; 2]) {
     assert!((0..2).all(|k| (found[k] - expected[k]).abs() < 1e-6), "{found:?}, not {expected:?}");
 }
 
+/// Drags a particle to each of these displacements and lets it go, while the body stands still.
+fn pull(body: &mut Body, particle: usize, by: &[&str]) {
+    ask(body, &format!(r#"{{"do":"grab","particle":{particle}}}"#));
+    by.iter().for_each(|by| ask(body, &format!(r#"{{"do":"drag","by":{by}}}"#)));
+    ask(body, r#"{"do":"release"}"#);
+}
+
 #[test]
 fn a_drag_while_a_body_stands_still_is_shown_at_once_and_the_next_step_goes_there() {
     // No role is taken before the second step.
@@ -273,9 +280,7 @@ fn a_drag_while_a_body_stands_still_is_shown_at_once_and_the_next_step_goes_ther
         ask(&mut body, r#"{"do":"undo"}"#);
         assert_near(shown(&body, 66), [x, y]);
 
-        ask(&mut body, r#"{"do":"grab","particle":66}"#);
-        ask(&mut body, r#"{"do":"drag","by":[1.0,0.5]}"#);
-        ask(&mut body, r#"{"do":"release"}"#);
+        pull(&mut body, 66, &["[1.0,0.5]"]);
         step(&mut body, steps);
         assert_near(body.engine().displacement(66).map(|along| along as f32), there);
         assert_near(shown(&body, 66), there);
@@ -296,9 +301,7 @@ fn drags_one_after_another_while_a_body_stands_still_add_up() {
     for particle in [66, leader] {
         let [x, y] = shown(&body, particle);
         for by in ["[0.5,0.0]", "[0.25,0.5]"] {
-            ask(&mut body, &format!(r#"{{"do":"grab","particle":{particle}}}"#));
-            ask(&mut body, &format!(r#"{{"do":"drag","by":{by}}}"#));
-            ask(&mut body, r#"{"do":"release"}"#);
+            pull(&mut body, particle, &[by]);
         }
         assert_near(shown(&body, particle), [x + 0.75, y + 0.5]);
         step(&mut body, 1);
@@ -308,9 +311,7 @@ fn drags_one_after_another_while_a_body_stands_still_add_up() {
     // Back to where it is: nothing is to come, and it is shown so.
     let here = shown(&body, leader);
     for by in ["[0.5,0.0]", "[-0.5,0.0]"] {
-        ask(&mut body, &format!(r#"{{"do":"grab","particle":{leader}}}"#));
-        ask(&mut body, &format!(r#"{{"do":"drag","by":{by}}}"#));
-        ask(&mut body, r#"{"do":"release"}"#);
+        pull(&mut body, leader, &[by]);
     }
     assert_near(shown(&body, leader), here);
     step(&mut body, 3);
@@ -336,9 +337,7 @@ fn a_drag_that_changes_nothing_is_nothing_to_undo() {
     step(&mut body, 10);
     let saved = body.saved().expect("can be written");
     for by in [&[][..], &["[0.0,0.0]"], &["[0.5,0.5]", "[0.0,0.0]"]] {
-        ask(&mut body, r#"{"do":"grab","particle":66}"#);
-        by.iter().for_each(|by| ask(&mut body, &format!(r#"{{"do":"drag","by":{by}}}"#)));
-        ask(&mut body, r#"{"do":"release"}"#);
+        pull(&mut body, 66, by);
         assert_eq!(body.undoable(), 0, "{by:?}");
     }
     assert_eq!(body.saved().expect("can be written"), saved);

@@ -6,6 +6,7 @@ use std::process::Command;
 
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::run;
+use flockform::engine::Engine;
 use flockform::scene::Scene;
 use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
@@ -46,6 +47,29 @@ fn assert_shown(seen: &Value, displacements: impl Iterator<Item = [f64; 2]>) {
     }
 }
 
+/// Where the page has saved.
+fn saved(seen: &Value) -> &Path {
+    Path::new(seen["saved"].as_str().expect("a path"))
+}
+
+/// The end of the run of the saved scene, which the page showed.
+fn run_again(seen: &Value) -> Engine {
+    let scene = Scene::from_file(saved(seen), &[]).unwrap_or_else(|error| panic!("{error}"));
+    let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
+    let engine = run(plan, &mut |_, _| ControlFlow::Continue(())).engine;
+    assert_shown(seen, (0..engine.body().count()).map(|i| engine.displacement(i)));
+    engine
+}
+
+/// That the page showed the end of the flight of a saved swarm.
+fn assert_flown(seen: &Value, swarm: &Swarm) {
+    let mut flight = Flight::new(swarm).unwrap_or_else(|error| panic!("{error}"));
+    (0..flight.periods()).for_each(|_| flight.step());
+    assert_eq!(seen["clock"], flight.fleet().time());
+    let (places, moved) = (&flight.control().formation().places, flight.fleet().places());
+    assert_shown(seen, moved.iter().zip(places.iter()).map(|([x, y], [px, py])| [x - px, y - py]));
+}
+
 #[test]
 #[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
 fn a_body_is_dragged_cut_undone_and_saved_while_another_viewer_looks_on() {
@@ -80,14 +104,10 @@ fn a_body_is_dragged_cut_undone_and_saved_while_another_viewer_looks_on() {
     assert!(hints["cut"].as_str().is_some_and(|words| words.contains("cut")), "{hints:?}");
     assert_eq!(hints["look"], "Drag to move the view");
     assert_eq!(seen["stepped"], 1.0);
-    let saved = Path::new(seen["saved"].as_str().expect("a path")).to_owned();
-    assert_eq!(saved, folder.path().join("tension_live.toml"));
-    let scene = Scene::from_file(&saved, &[]).unwrap_or_else(|error| panic!("{error}"));
-    let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
-    let engine = run(plan, &mut |_, _| ControlFlow::Continue(())).engine;
+    assert_eq!(saved(&seen), folder.path().join("tension_live.toml"));
+    let engine = run_again(&seen);
     assert_eq!(seen["clock"], engine.step() as f64);
     assert!(!engine.breaks().is_empty());
-    assert_shown(&seen, (0..engine.body().count()).map(|i| engine.displacement(i)));
 }
 
 #[test]
@@ -97,15 +117,9 @@ fn a_leader_is_dragged_and_a_robot_killed_and_the_flight_saved() {
     let served = Served::swarm("square", &[], folder.path());
     let seen = tour(&served.address, &json!({ "name": "square", "drag": 0, "fault": 12 }));
     assert_eq!(seen["hurt"], json!([[12, "dead"]]));
-    let saved = Path::new(seen["saved"].as_str().expect("a path")).to_owned();
-    let swarm = Swarm::from_file(&saved, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let swarm = Swarm::from_file(saved(&seen), &[]).unwrap_or_else(|error| panic!("{error}"));
     assert!(swarm.raw.flight.commands.iter().filter(|one| one.after > 0).count() > 3);
-    let mut flight = Flight::new(&swarm).unwrap_or_else(|error| panic!("{error}"));
-    (0..flight.periods()).for_each(|_| flight.step());
-    assert_eq!(seen["clock"], flight.fleet().time());
-    let places = flight.control().formation().places.clone();
-    let moved = flight.fleet().places();
-    assert_shown(&seen, moved.iter().zip(places.iter()).map(|([x, y], [px, py])| [x - px, y - py]));
+    assert_flown(&seen, &swarm);
 }
 
 #[test]
@@ -123,14 +137,8 @@ fn an_obstacle_is_pushed_and_the_formation_squeezed_and_the_flight_saved() {
     let seen = tour(&served.address, &pushed);
     assert!(seen["pushed"][0].as_f64() > Some(3.3), "{}", seen["pushed"]);
     assert!((4.0..5.6).contains(&seen["squeezed"].as_f64().expect("measured")), "{}", seen["squeezed"]);
-    let saved = Path::new(seen["saved"].as_str().expect("a path")).to_owned();
-    let swarm = Swarm::from_file(&saved, &[]).unwrap_or_else(|error| panic!("{error}"));
-    let mut flight = Flight::new(&swarm).unwrap_or_else(|error| panic!("{error}"));
-    (0..flight.periods()).for_each(|_| flight.step());
-    assert_eq!(seen["clock"], flight.fleet().time());
-    let places = flight.control().formation().places.clone();
-    let moved = flight.fleet().places();
-    assert_shown(&seen, moved.iter().zip(places.iter()).map(|([x, y], [px, py])| [x - px, y - py]));
+    let swarm = Swarm::from_file(saved(&seen), &[]).unwrap_or_else(|error| panic!("{error}"));
+    assert_flown(&seen, &swarm);
 }
 
 #[test]
@@ -143,8 +151,7 @@ fn a_formation_is_designed_and_the_file_is_the_design() {
     let words = seen["exact"].as_array().expect("words");
     assert_eq!(words[0], "followers take part exactly in every shift of the leaders");
     assert_eq!(seen["removed"], 25);
-    let saved = Path::new(seen["saved"].as_str().expect("a path")).to_owned();
-    let swarm = Swarm::from_file(&saved, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let swarm = Swarm::from_file(saved(&seen), &[]).unwrap_or_else(|error| panic!("{error}"));
     let scout = swarm.raw.robots.iter().find(|robot| robot.name == "scout").expect("named");
     assert!((scout.place[0] - 7.5).abs() < 0.05 && (scout.place[1] - 4.5).abs() < 0.05, "{:?}", scout.place);
     assert!(scout.neighbours.contains(&"robot_13".to_owned()), "{:?}", scout.neighbours);
@@ -164,11 +171,7 @@ fn an_edge_is_loaded_by_hand_and_the_body_saved() {
     let seen = tour(&served.address, &json!({ "name": "loaded", "load": 137 }));
     assert!(seen["loaded"][0].as_f64() > Some(0.3), "{}", seen["loaded"]);
     assert_eq!(seen["hints"]["load"], "Drag a side of the body to load it");
-    let saved = Path::new(seen["saved"].as_str().expect("a path")).to_owned();
-    let scene = Scene::from_file(&saved, &[]).unwrap_or_else(|error| panic!("{error}"));
-    let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
-    let engine = run(plan, &mut |_, _| ControlFlow::Continue(())).engine;
-    assert_shown(&seen, (0..engine.body().count()).map(|i| engine.displacement(i)));
+    run_again(&seen);
 }
 
 /// That the view is large and the clock below it in the window.

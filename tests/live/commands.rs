@@ -3,9 +3,7 @@
 use serde_json::json;
 
 use super::folders::temporary;
-use super::pages::{Viewer, address, start};
-use super::strangers::PATIENCE;
-use super::waits::within;
+use super::pages::{Viewer, start};
 
 /// A key that names a pipe, which nothing ever comes out of.
 #[cfg(unix)]
@@ -15,8 +13,7 @@ fn an_interrupt_ends_a_session_that_is_busy_and_leaves_nothing_half_written() {
     let pipe = folder.path().join("pipe.csv");
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().expect("starts").success());
     let mut program = start(&["live", "tension", "--record", "live.mcap"], folder.path());
-    let (host, token) = address(folder.path());
-    let mut viewer = within(PATIENCE, "a viewer is let in", || Viewer::enter(&host, &token));
+    let mut viewer = Viewer::of(folder.path());
     let motion = "{ kind = \"csv\", file = \"pipe.csv\", steps = 5 }";
     viewer.ask(&json!({ "do": "set", "key": "roles[1].motion", "value": motion }));
     // Returns when the session has opened the other end.
@@ -37,8 +34,7 @@ fn the_page_shows_the_command_with_what_was_set() {
     {
         let folder = temporary();
         let _program = start(&["live", name, "--set", key], folder.path());
-        let (host, token) = address(folder.path());
-        let mut viewer = within(PATIENCE, "a viewer is let in", || Viewer::enter(&host, &token));
+        let mut viewer = Viewer::of(folder.path());
         let typed = format!("flockform live {name} --set 'title=it'\\''s'");
         viewer.status("the command", |status| status["command"] == typed);
         viewer.ask(&json!({ "do": "set", "key": more, "value": "0.5" }));

@@ -10,11 +10,7 @@ use flockform::swarm::flight::Flight;
 use flockform::swarm::formation::Formation;
 use proptest::prelude::*;
 
-fn begun(name: &str, set: &[&str]) -> Live {
-    let set: Vec<String> = set.iter().map(|&one| one.to_owned()).collect();
-    let swarm = bundled_swarm(name).expect("bundled").load_swarm(&set);
-    Live::new(swarm.unwrap_or_else(|error| panic!("{error}")), None).unwrap_or_else(|error| panic!("{error}"))
-}
+use super::swarms::{begun, saved};
 
 fn try_edit(live: &mut Live, edit: Edit) -> Result<(), String> {
     live.perform(0, &Command::Design { edit }).map_err(|refused| refused.0)
@@ -36,11 +32,6 @@ fn number(live: &Live, name: &str) -> usize {
 fn neighbours(live: &Live, name: &str) -> Vec<String> {
     let formation = formation(live);
     formation.neighbours(number(live, name)).map(|k| formation.names[k].clone()).collect()
-}
-
-fn saved(live: &Live) -> Swarm {
-    let text = live.saved().expect("can be written");
-    Swarm::parse("saved", "saved.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
 fn flown(swarm: &Swarm) -> Vec<[f64; 2]> {

@@ -27,6 +27,5 @@ mod served;
 mod signals;
 mod strangers;
 mod swarms;
-#[cfg(feature = "cli")]
 #[path = "../common/waits.rs"]
 mod waits;

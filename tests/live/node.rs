@@ -49,7 +49,7 @@ impl Flown {
     /// The request for a socket.
     fn asks(&self) -> String {
         let origin = format!("Origin: http://{}\r\n", self.host);
-        socket_request(&self.host, &self.token, &self.host, &origin)
+        socket_request(&self.token, &self.host, &origin)
     }
 
     fn viewer(&self) -> Viewer {

@@ -11,6 +11,7 @@ use tungstenite::client::ClientRequestBuilder;
 use tungstenite::{Message, WebSocket};
 
 use super::running::Running;
+use super::served::parts;
 use super::strangers::PATIENCE;
 use super::waits::within;
 
@@ -32,10 +33,7 @@ pub fn address(folder: &Path) -> (String, String) {
             .split_once('\n')
             .map(|(line, _)| line.to_owned())
     };
-    let line = within(PATIENCE, "an address", line);
-    let rest = line.strip_prefix("http://").expect("an address");
-    let (host, token) = rest.split_once("/?token=").expect("with a token");
-    (host.to_owned(), token.to_owned())
+    parts(&within(PATIENCE, "an address", line))
 }
 
 /// A page without a browser.
@@ -54,6 +52,12 @@ impl Viewer {
         let request = ClientRequestBuilder::new(uri).with_header("Origin", format!("http://{host}"));
         let (socket, _) = tungstenite::client(request, stream).ok()?;
         Some(Self { socket, frame: Vec::new() })
+    }
+
+    /// The first of a program in this folder.
+    pub fn of(folder: &Path) -> Self {
+        let (host, token) = address(folder);
+        within(PATIENCE, "a viewer is let in", || Self::enter(&host, &token))
     }
 
     pub fn ask(&mut self, command: &Value) {

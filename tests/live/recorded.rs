@@ -8,7 +8,7 @@ use flockform::record::replay::replay_file;
 use serde_json::json;
 
 use super::folders::temporary;
-use super::pages::{Viewer, address, start};
+use super::pages::{Viewer, start};
 use super::strangers::PATIENCE;
 use super::waits::within;
 
@@ -31,8 +31,7 @@ fn a_session_is_recorded_as_a_run_of_the_file_that_replays_it() {
         let folder = temporary();
         let of = |file: &str| folder.path().join(file);
         let mut program = start(&["live", name, "--record", "live.mcap", "--out", "."], folder.path());
-        let (host, token) = address(folder.path());
-        let mut viewer = within(PATIENCE, "a viewer is let in", || Viewer::enter(&host, &token));
+        let mut viewer = Viewer::of(folder.path());
         viewer.ask(&json!({ "do": "grab", "particle": particle }));
         viewer.ask(&json!({ "do": "play" }));
         for k in 1..=5 {
@@ -76,8 +75,7 @@ fn a_session_that_was_never_set_going_is_no_recording() {
     for (name, words) in [("square", "no period was flown"), ("tension", "no step was taken")] {
         let folder = temporary();
         let mut program = start(&["live", name, "--record", "live.mcap"], folder.path());
-        let (host, token) = address(folder.path());
-        let mut viewer = within(PATIENCE, "a viewer is let in", || Viewer::enter(&host, &token));
+        let mut viewer = Viewer::of(folder.path());
         viewer.ask(&json!({ "do": "step" }));
         viewer.status("it goes on", |status| status["clock"].as_f64() > Some(0.0));
         viewer.ask(&json!({ "do": "reset" }));

@@ -44,10 +44,15 @@ impl Served {
 
     /// Host with port, and token.
     pub fn parts(&self) -> (String, String) {
-        let rest = self.address.strip_prefix("http://").expect("an address");
-        let (host, token) = rest.split_once("/?token=").expect("with a token");
-        (host.to_owned(), token.to_owned())
+        parts(&self.address)
     }
+}
+
+/// Host with port, and token, of the address of a page.
+pub fn parts(address: &str) -> (String, String) {
+    let rest = address.strip_prefix("http://").expect("an address");
+    let (host, token) = rest.split_once("/?token=").expect("with a token");
+    (host.to_owned(), token.to_owned())
 }
 
 impl Drop for Served {

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::folders::temporary;
 use super::served::Served;
+use super::waits::within;
 
 /// Time for what a busy computer does in a moment.
 pub const PATIENCE: Duration = Duration::from_secs(60);
@@ -20,8 +21,7 @@ pub fn answer(host: &str, request: &str) -> String {
     String::from_utf8_lossy(&bytes[..count]).into_owned()
 }
 
-pub fn socket_request(host: &str, token: &str, named: &str, origin: &str) -> String {
-    let _ = host;
+pub fn socket_request(token: &str, named: &str, origin: &str) -> String {
     format!(
         "GET /socket?token={token} HTTP/1.1\r\nHost: {named}\r\n{origin}Connection: Upgrade\r\nUpgrade: websocket\r\n\
          Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
@@ -46,16 +46,16 @@ fn without_its_token_its_host_or_its_origin_nothing_is_answered() {
         page(&token, "evil.example:80", ""),
         page(&token, "127.0.0.1", ""),
         page(&token, &host, "Origin: http://evil.example\r\n"),
-        answer(&host, &socket_request(&host, &token, &host, "")),
-        answer(&host, &socket_request(&host, &token, &host, "Origin: http://evil.example\r\n")),
-        answer(&host, &socket_request(&host, &wrong, &host, &format!("Origin: http://{host}\r\n"))),
-        answer(&host, &socket_request(&host, &token, "evil.example", &format!("Origin: http://{host}\r\n"))),
+        answer(&host, &socket_request(&token, &host, "")),
+        answer(&host, &socket_request(&token, &host, "Origin: http://evil.example\r\n")),
+        answer(&host, &socket_request(&wrong, &host, &format!("Origin: http://{host}\r\n"))),
+        answer(&host, &socket_request(&token, "evil.example", &format!("Origin: http://{host}\r\n"))),
     ];
     for (n, refusal) in refused.iter().enumerate() {
         assert!(refusal.starts_with("HTTP/1.1 403"), "{n}: {refusal:.200}");
         assert!(!refusal.contains(&token), "{n}");
     }
-    let let_in = answer(&host, &socket_request(&host, &token, &host, &format!("Origin: http://{host}\r\n")));
+    let let_in = answer(&host, &socket_request(&token, &host, &format!("Origin: http://{host}\r\n")));
     assert!(
         let_in.starts_with("HTTP/1.1 101") && let_in.contains("s3pPLMBiTxaQ9kYGzzhZRbK+xOo="),
         "{let_in:.200}"
@@ -82,7 +82,7 @@ fn floods_garbage_and_slow_readers_do_not_stop_the_session() {
     while endless.write_all(&[b'a'; 4096]).is_ok() && begun.elapsed() < PATIENCE {}
     assert!(begun.elapsed() < PATIENCE, "an endless head is cut off");
     // One that plays and never reads a byte of what it is sent.
-    let asks = socket_request(&host, &token, &host, &format!("Origin: http://{host}\r\n"));
+    let asks = socket_request(&token, &host, &format!("Origin: http://{host}\r\n"));
     let mut deaf = let_in(&host, &asks);
     deaf.write_all(&masked(br#"{"do":"play"}"#)).expect("takes a request");
     // Longer than a request may be: this one is sent away.
@@ -102,23 +102,12 @@ fn floods_garbage_and_slow_readers_do_not_stop_the_session() {
 
 /// Waits until something holds.
 pub fn soon(what: &str, holds: impl Fn() -> bool) {
-    let begun = Instant::now();
-    while !holds() {
-        assert!(begun.elapsed() < PATIENCE, "not in {PATIENCE:?}: {what}");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    within(PATIENCE, what, || holds().then_some(()));
 }
 
 /// A socket that is let in, if need be once others have gone.
 pub fn let_in(host: &str, asks: &str) -> TcpStream {
-    let begun = Instant::now();
-    loop {
-        if let Ok(stream) = try_let_in(host, asks) {
-            return stream;
-        }
-        assert!(begun.elapsed() < PATIENCE, "nobody is let in");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    within(PATIENCE, "a socket that is let in", || try_let_in(host, asks).ok())
 }
 
 fn try_let_in(host: &str, asks: &str) -> std::io::Result<TcpStream> {

@@ -7,14 +7,15 @@ use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::flight::Flight;
 
-fn begun(name: &str) -> Live {
-    begun_with(name, &[])
+pub fn begun(name: &str, set: &[&str]) -> Live {
+    let set: Vec<String> = set.iter().map(|&one| one.to_owned()).collect();
+    let swarm = bundled_swarm(name).expect("bundled").load_swarm(&set);
+    Live::new(swarm.unwrap_or_else(|error| panic!("{error}")), None).unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn begun_with(name: &str, set: &[String]) -> Live {
-    let swarm = bundled_swarm(name).expect("bundled").load_swarm(set);
-    let swarm = swarm.unwrap_or_else(|error| panic!("{error}"));
-    Live::new(swarm, None).unwrap_or_else(|error| panic!("{error}"))
+pub fn saved(live: &Live) -> Swarm {
+    let text = live.saved().expect("can be written");
+    Swarm::parse("saved", "saved.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
 fn ask(swarm: &mut Live, text: &str) {
@@ -36,10 +37,7 @@ fn bits(flight: &Flight) -> Vec<[u64; 2]> {
 }
 
 fn assert_replays(swarm: &Live) {
-    let text = swarm.saved().expect("can be written");
-    let file = Swarm::parse("saved", "saved.toml", &text, &[], None)
-        .unwrap_or_else(|error| panic!("{error}\n{text}"));
-    let mut again = Flight::new(&file).unwrap_or_else(|error| panic!("{error}"));
+    let mut again = Flight::new(&saved(swarm)).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(again.periods(), swarm.flight().fleet().period());
     (0..again.periods()).for_each(|_| again.step());
     assert!(bits(swarm.flight()) == bits(&again), "the same places to the last bit");
@@ -47,7 +45,7 @@ fn assert_replays(swarm: &Live) {
 
 #[test]
 fn leaders_led_by_hand_broken_robots_and_lost_poses_are_flown_again_to_the_bit() {
-    let mut swarm = begun("square");
+    let mut swarm = begun("square", &[]);
     fly(&mut swarm, 20);
     let leader = leader(&swarm);
     ask(&mut swarm, &format!(r#"{{"do":"grab","particle":{leader}}}"#));
@@ -74,14 +72,14 @@ fn leaders_led_by_hand_broken_robots_and_lost_poses_are_flown_again_to_the_bit()
 
 #[test]
 fn at_one_period_the_commands_of_the_file_come_after_those_of_the_hand() {
-    let square = begun("square");
+    let square = begun("square", &[]);
     let leader = leader(&square);
     let formation = square.flight().control().formation();
     let (name, [x, y]) = (&formation.names[leader], formation.places.get(leader));
     let own = format!(
         "flight.commands=[{{ after = 5, what = {{ kind = \"lead\", robot = \"{name}\", to = [{x}, {y}] }} }}]"
     );
-    let mut swarm = begun_with("square", &[own]);
+    let mut swarm = begun("square", &[&own]);
     fly(&mut swarm, 5);
     ask(&mut swarm, &format!(r#"{{"do":"grab","particle":{leader},"alone":true}}"#));
     ask(&mut swarm, r#"{"do":"drag","by":[0.5,-0.5]}"#);
@@ -91,7 +89,7 @@ fn at_one_period_the_commands_of_the_file_come_after_those_of_the_hand() {
 
 #[test]
 fn a_follower_is_not_led_and_a_lead_out_of_range_is_refused() {
-    let mut swarm = begun("square");
+    let mut swarm = begun("square", &[]);
     let formation = swarm.flight().control().formation();
     let follower = (0..formation.count()).find(|&m| !formation.leads(m)).expect("follows");
     let refused = |swarm: &mut Live, command: Command| swarm.perform(0, &command).expect_err("refused").0;
@@ -107,7 +105,7 @@ fn a_follower_is_not_led_and_a_lead_out_of_range_is_refused() {
 
 #[test]
 fn a_broken_bound_is_named_with_its_robots() {
-    let mut swarm = begun("square");
+    let mut swarm = begun("square", &[]);
     ask(&mut swarm, r#"{"do":"set","key":"flight.bounds.clearance","value":"5.0"}"#);
     fly(&mut swarm, 2);
     let (words, robots) = swarm.alarms();
@@ -125,7 +123,7 @@ fn shown(swarm: &Live, name: &str, robot: usize) -> f32 {
 
 #[test]
 fn a_leader_dragged_while_robots_stand_still_has_its_target_at_once() {
-    let mut swarm = begun("square");
+    let mut swarm = begun("square", &[]);
     let leader = leader(&swarm);
     let place = swarm.flight().fleet().places().get(leader);
     let from = swarm.flight().control().formation().places.get(leader);
@@ -142,7 +140,7 @@ fn a_leader_dragged_while_robots_stand_still_has_its_target_at_once() {
 
 #[test]
 fn a_hand_that_moves_nothing_is_nothing_to_undo() {
-    let mut swarm = begun("square");
+    let mut swarm = begun("square", &[]);
     let leader = leader(&swarm);
     ask(&mut swarm, &format!(r#"{{"do":"grab","particle":{leader}}}"#));
     ask(&mut swarm, r#"{"do":"drag","by":[0.0,0.0]}"#);
@@ -157,7 +155,7 @@ fn a_hand_that_moves_nothing_is_nothing_to_undo() {
 
 #[test]
 fn speed_and_acceleration_are_those_of_the_robots() {
-    let mut swarm = begun("square");
+    let mut swarm = begun("square", &[]);
     let robot = leader(&swarm);
     fly(&mut swarm, 1);
     let [x, y] = swarm.flight().fleet().robots()[robot].velocity;
@@ -178,7 +176,7 @@ fn a_drag_of_what_was_not_to_be_taken_is_refused_once() {
     let (host, token) = served.parts();
     let mut viewer = Viewer::enter(&host, &token).expect("let in");
     let follower = {
-        let swarm = begun("square");
+        let swarm = begun("square", &[]);
         let formation = swarm.flight().control().formation();
         (0..formation.count()).find(|&m| !formation.leads(m)).expect("follows")
     };
@@ -197,7 +195,7 @@ fn a_drag_of_what_was_not_to_be_taken_is_refused_once() {
 
 #[test]
 fn a_lead_of_a_file_to_where_no_pose_is_believed_is_refused_with_its_key() {
-    let name = begun("square").flight().control().formation().names[0].clone();
+    let name = begun("square", &[]).flight().control().formation().names[0].clone();
     let led = |x: f64| {
         let lead = format!("{{ kind = \"lead\", robot = \"{name}\", to = [{x}, 0.0] }}");
         let set =
@@ -213,7 +211,7 @@ fn a_lead_of_a_file_to_where_no_pose_is_believed_is_refused_with_its_key() {
 fn moved_obstacles_are_avoided_and_flown_again_to_the_bit() {
     let obstacles = "obstacles=[{ kind = \"disc\", centre = [40.0, 0.0], radius = 0.5 }, \
                      { kind = \"polygon\", vertices = [[-30.0, 0.0], [-29.0, 0.0], [-29.0, 1.0]] }]";
-    let mut swarm = begun_with("square", &[obstacles.to_owned()]);
+    let mut swarm = begun("square", &[obstacles]);
     fly(&mut swarm, 5);
     let centre = swarm.flight().fleet().places().get(12);
     ask(&mut swarm, r#"{"do":"grab-obstacle","obstacle":0}"#);
@@ -241,7 +239,7 @@ fn moved_obstacles_are_avoided_and_flown_again_to_the_bit() {
 #[test]
 fn obstacles_that_are_none_or_go_too_far_are_refused_by_hand_and_in_a_file() {
     let obstacle = "obstacles=[{ kind = \"polygon\", vertices = [[30.0, 0.0], [31.0, 0.0], [31.0, 1.0]] }]";
-    let mut swarm = begun_with("square", &[obstacle.to_owned()]);
+    let mut swarm = begun("square", &[obstacle]);
     let refused = |swarm: &mut Live, text: &str| {
         swarm.perform(0, &Command::parse(text).expect("a request")).expect_err("refused").0
     };
@@ -263,7 +261,7 @@ fn obstacles_that_are_none_or_go_too_far_are_refused_by_hand_and_in_a_file() {
 
 #[test]
 fn a_squeezed_formation_is_as_wide_as_its_leaders_and_flown_again_to_the_bit() {
-    let mut swarm = begun("square");
+    let mut swarm = begun("square", &[]);
     let wide = |swarm: &Live| {
         let places = swarm.flight().fleet().places();
         let largest = places.x.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -68,7 +68,7 @@ pub struct AtRest {
 }
 
 /// What is done on all ranks: on those of a team, or on threads.
-fn on<T: Send>(
+pub(super) fn on<T: Send>(
     ranks: usize,
     team: Option<&Team>,
     work: impl Fn(&Team) -> T + Sync + Send,

@@ -235,10 +235,7 @@ fn measured(
 ) -> Result<Case, ThreadPoolBuildError> {
     let plans: [Plan; 2] = [alone, shared].map(|size| plan(size, &[]));
     let work = |team: &Team| ranks::time(team, plans.each_ref(), effort.turns);
-    let times = match team {
-        Some(team) => ranks::single()?.install(|| work(team)),
-        None => on_threads(ranks, work)?,
-    };
+    let times = large::on(ranks, team, work)?;
     let times_as_large = (shared[0] / alone[0]) as f64;
     Ok(Case {
         ranks,

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use super::super::grid::stirred;
-use super::super::machine::median;
+use super::super::machine::{median, seconds_each};
 use super::model::Link;
 use crate::continuum::plan::Plan;
 use crate::engine::Engine;
@@ -194,7 +194,5 @@ pub fn step(engine: &mut Engine, steps: usize, most: usize) {
 }
 
 fn timed(engine: &mut Engine, steps: usize) -> f64 {
-    let begin = Instant::now();
-    step(engine, steps, MOST_STEPS);
-    begin.elapsed().as_secs_f64() / steps as f64
+    seconds_each(steps, || step(engine, steps, MOST_STEPS))
 }

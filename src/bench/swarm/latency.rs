@@ -8,6 +8,9 @@ use std::fmt;
 
 use serde::Serialize;
 
+#[cfg(feature = "ros")]
+use crate::bench::machine::quantile;
+
 /// The cases that could be measured.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Report {
@@ -42,13 +45,6 @@ impl Case {
         let (p50_seconds, p99_seconds) = (quantile(&times, 0.5), quantile(&times, 0.99));
         Self { robots, period_seconds, samples: times.len(), lost, p50_seconds, p99_seconds }
     }
-}
-
-/// The smallest of the sorted values that so large a share of them does not exceed.
-#[cfg(feature = "ros")]
-fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
-    let rank = (share * sorted.len() as f64).ceil() as usize;
-    sorted.get(rank.saturating_sub(1)).copied()
 }
 
 impl fmt::Display for Report {
@@ -139,11 +135,19 @@ mod over_dds {
         RosArguments { environment, ..RosArguments::default() }
     }
 
+    /// Robots and the node that serves them.
+    fn open(robots: usize) -> Result<(Fleet, FormationNode), String> {
+        let swarm = formation(robots, 1, PERIOD).map_err(words)?;
+        Ok((Fleet::open(&swarm)?, FormationNode::open(&swarm, &arguments(), None).map_err(words)?))
+    }
+
+    fn words(error: impl std::fmt::Display) -> String {
+        error.to_string()
+    }
+
     /// The node ticks at its own rate in a thread of its own.
     fn steadily(robots: usize, rounds: usize) -> Result<Case, String> {
-        let swarm = formation(robots, 1, PERIOD).map_err(|error| error.to_string())?;
-        let mut fleet = Fleet::open(&swarm)?;
-        let mut node = FormationNode::open(&swarm, &arguments(), None).map_err(|error| error.to_string())?;
+        let (mut fleet, mut node) = open(robots)?;
         let stop = AtomicBool::new(false);
         std::thread::scope(|scope| {
             scope.spawn(|| node.run(&stop));
@@ -155,9 +159,7 @@ mod over_dds {
 
     /// The node ticks whenever the robots look.
     fn at_once(robots: usize, rounds: usize) -> Result<Case, String> {
-        let swarm = formation(robots, 1, PERIOD).map_err(|error| error.to_string())?;
-        let mut fleet = Fleet::open(&swarm)?;
-        let mut node = FormationNode::open(&swarm, &arguments(), None).map_err(|error| error.to_string())?;
+        let (mut fleet, mut node) = open(robots)?;
         let (times, lost) = fleet.fly(rounds, &mut || node.tick())?;
         Ok(Case::of(robots, None, times, lost))
     }
@@ -175,13 +177,12 @@ mod over_dds {
 
     impl Fleet {
         fn open(swarm: &Swarm) -> Result<Self, String> {
-            let control = Control::new(swarm).map_err(|error| error.to_string())?;
+            let control = Control::new(swarm).map_err(words)?;
             let formation = control.formation();
             let arguments = arguments();
             let domain = arguments.environment.domain;
-            let edge =
-                Edge::open(Options { domain, loopback_only: true }).map_err(|error| error.to_string())?;
-            let node = edge.node("/", "bench_robots").map_err(|error| error.to_string())?;
+            let edge = Edge::open(Options { domain, loopback_only: true }).map_err(words)?;
+            let node = edge.node("/", "bench_robots").map_err(words)?;
             let raw = &swarm.raw.node;
             let topic = |pattern: &str, name: &str| node.topic(&pattern.replace("{name}", name));
             let names = &formation.names;
@@ -190,8 +191,8 @@ mod over_dds {
                 |name: &String| node.subscription(&topic(&raw.target_topic, name)?, Quality::reliable(1));
             Ok(Self {
                 places: formation.places.clone(),
-                poses: names.iter().map(pose).collect::<Result<_, _>>().map_err(|error| error.to_string())?,
-                targets: names.iter().map(target).collect::<Result<_, _>>().map_err(|e| e.to_string())?,
+                poses: names.iter().map(pose).collect::<Result<_, _>>().map_err(words)?,
+                targets: names.iter().map(target).collect::<Result<_, _>>().map_err(words)?,
                 frame_id: raw.frame_id.clone(),
                 round: 0,
                 _node: node,
@@ -243,7 +244,7 @@ mod over_dds {
                     Header { stamp: Time::from_seconds(system_time()), frame_id: self.frame_id.clone() };
                 let message = PoseStamped { header, pose: Pose::planar(here.get(member), 0.0) };
                 sent.push(Instant::now());
-                self.poses[member].publish(&message).map_err(|error| error.to_string())?;
+                self.poses[member].publish(&message).map_err(words)?;
             }
             let mut answered: Vec<(usize, Option<f64>)> = (0..count).map(|member| (member, None)).collect();
             let begun = Instant::now();

@@ -6,14 +6,13 @@
 //! the filter has to look at the same ten, and to project onto a cell of as many half-planes.
 
 use std::hint::black_box;
-use std::time::Instant;
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 
 use super::Effort;
-use crate::bench::machine::median;
+use crate::bench::machine::{median, seconds_each};
 use crate::flock::grid::CellGrid;
 use crate::flock::law::{Flock, Weights};
 use crate::flock::neighbourhood::Neighbours;
@@ -131,11 +130,7 @@ impl Swarm {
 
     /// Seconds per tick over some ticks.
     fn time(&mut self, ticks: usize, filtered: bool) -> f64 {
-        let begin = Instant::now();
-        for _ in 0..ticks {
-            self.serve(filtered);
-        }
-        begin.elapsed().as_secs_f64() / ticks as f64
+        seconds_each(ticks, || (0..ticks).for_each(|_| self.serve(filtered)))
     }
 
     fn serve(&mut self, filtered: bool) {

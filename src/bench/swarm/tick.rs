@@ -1,12 +1,11 @@
 //! The control loop's whole tick: a fresh pose of every member received, then the tick.
 
 use std::hint::black_box;
-use std::time::Instant;
 
 use serde::Serialize;
 
 use super::{Effort, formation};
-use crate::bench::machine::median;
+use crate::bench::machine::{median, seconds_each};
 use crate::swarm::control::Control;
 use crate::swarm::watch::Pose;
 
@@ -50,9 +49,7 @@ impl Loop {
 
     /// Seconds per tick over some ticks.
     fn time(&mut self, ticks: usize) -> f64 {
-        let begin = Instant::now();
-        (0..ticks).for_each(|_| self.serve());
-        begin.elapsed().as_secs_f64() / ticks as f64
+        seconds_each(ticks, || (0..ticks).for_each(|_| self.serve()))
     }
 
     fn serve(&mut self) {

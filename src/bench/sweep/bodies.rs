@@ -1,7 +1,7 @@
 //! The bodies that are swept, and the ways to do it.
 
-use std::time::Instant;
-
+use super::super::grid::stirred;
+use super::super::machine::seconds_each;
 use crate::flock::block::Block;
 use crate::flock::fracture::{Bonds, Ghosts, Threshold};
 use crate::flock::lattice::{Lattice, LatticeKind};
@@ -36,7 +36,6 @@ const CRACKS_EVERY: usize = 12;
 /// A body and a way to sweep it.
 pub struct Subject {
     pub name: &'static str,
-    pub precision: &'static str,
     pub side: usize,
     pub steps_together: usize,
     pub followers: usize,
@@ -49,6 +48,25 @@ pub struct Subject {
 }
 
 impl Subject {
+    /// A plain body of one step at a time, by one thread, with so many followers.
+    fn new(
+        name: &'static str,
+        side: usize,
+        followers: usize,
+        step: impl FnMut(usize) + Send + 'static,
+    ) -> Self {
+        Self {
+            name,
+            side,
+            steps_together: 1,
+            followers,
+            bonds_watched: 0,
+            bytes_per_update: BYTES_PER_UPDATE,
+            is_shared: false,
+            step: Box::new(step),
+        }
+    }
+
     /// A small body's step is too short for the clock: as many as fill the time.
     pub fn steps_in(&mut self, seconds: f64) -> usize {
         self.time(self.steps_together);
@@ -58,9 +76,7 @@ impl Subject {
 
     /// Seconds per step over some steps.
     pub fn time(&mut self, steps: usize) -> f64 {
-        let begin = Instant::now();
-        (self.step)(steps);
-        begin.elapsed().as_secs_f64() / steps as f64
+        seconds_each(steps, || (self.step)(steps))
     }
 }
 
@@ -114,9 +130,7 @@ impl Body {
     }
 
     fn new(side: usize, reference: Vectors, neighbours: Neighbours, roles: Vec<Role>) -> Self {
-        // No particle at rest to the bit, so that there is something to compute everywhere.
-        let waves = |[x, y]: [f64; 2]| [x + 0.01 * (0.1 * y).sin(), y + 0.01 * (0.1 * x).sin()];
-        let present = reference.iter().map(waves).collect();
+        let present = stirred(&reference).collect();
         let (rule, weights, reference) = (Rule::BARYCENTRE, Weights::Equal, reference.into());
         let flock = Flock::new(rule, reference, neighbours, weights);
         Self { side, flock, roles, present }
@@ -146,17 +160,8 @@ impl Body {
                 }
             }
         };
-        Subject {
-            name,
-            precision: "f64",
-            side,
-            steps_together,
-            followers,
-            bonds_watched: 0,
-            bytes_per_update,
-            is_shared: true,
-            step: Box::new(step),
-        }
+        let subject = Subject::new(name, side, followers, step);
+        Subject { steps_together, bytes_per_update, is_shared: true, ..subject }
     }
 }
 
@@ -185,17 +190,7 @@ fn plain_loop(side: usize) -> Subject {
             std::mem::swap(&mut present, &mut next);
         }
     };
-    Subject {
-        name: LOOP,
-        precision: "f64",
-        side,
-        steps_together: 1,
-        followers: (side - 2).pow(2),
-        bonds_watched: 0,
-        bytes_per_update: BYTES_PER_UPDATE,
-        is_shared: false,
-        step: Box::new(step),
-    }
+    Subject::new(LOOP, side, (side - 2).pow(2), step)
 }
 
 /// Matrices that take every place to the barycentre's, but have to be multiplied out.
@@ -243,18 +238,9 @@ fn fracture(side: usize, cracked: bool) -> Subject {
             std::mem::swap(&mut present, &mut next);
         }
     };
-    Subject {
-        name: if cracked { CRACKED } else { INTACT },
-        precision: "f64",
-        side,
-        steps_together: 1,
-        followers,
-        bonds_watched,
-        // The positions once more, to look at the bonds.
-        bytes_per_update: BYTES_PER_UPDATE + 16.0,
-        is_shared: false,
-        step: Box::new(step),
-    }
+    let subject = Subject::new(if cracked { CRACKED } else { INTACT }, side, followers, step);
+    // The positions once more, to look at the bonds.
+    Subject { bonds_watched, bytes_per_update: BYTES_PER_UPDATE + 16.0, ..subject }
 }
 
 /// A hexagonal lattice swept by lists, as an irregular body is, its particles numbered one way or the other.
@@ -278,9 +264,7 @@ fn lists(side: usize, order: &'static str) -> Subject {
         .map(|j| if neighbours.of(j).is_empty() { Role::Clamped } else { Role::Follower })
         .collect();
     let body = Body::new(side, reorder(&points, &rank), neighbours, roles);
-    let mut subject = body.subject(order, BYTES_PER_UPDATE + BYTES_PER_LIST, 1);
-    subject.is_shared = false;
-    subject
+    Subject { is_shared: false, ..body.subject(order, BYTES_PER_UPDATE + BYTES_PER_LIST, 1) }
 }
 
 /// The places of a hexagonal lattice, jumbled so little that no neighbours change but no two are translates, and

@@ -5,7 +5,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::super::grid::{plan, stirred};
-use super::super::machine::median;
+use super::super::machine::{median, seconds_each};
 use crate::continuum::plan::Plan;
 use crate::continuum::record::{ProbeSeries, Snapshot};
 use crate::engine::Engine;
@@ -117,18 +117,18 @@ impl Bare {
     }
 
     fn time(&mut self, steps: usize) -> f64 {
-        let begin = Instant::now();
-        for _ in 0..steps {
-            let bands = 0..self.rows.band_count();
-            let Self { rows, present, next } = self;
-            for (axis, present, next) in [(0, &present.x, &mut next.x), (1, &present.y, &mut next.y)] {
-                let component =
-                    Component { axis, seen_from: 0, present, rest: None, force: None, begin: 0, next };
-                rows.sweep(bands.clone(), 64, &mut [component], &Terms::NONE);
-            }
-            std::mem::swap(present, next);
+        seconds_each(steps, || (0..steps).for_each(|_| self.step()))
+    }
+
+    fn step(&mut self) {
+        let bands = 0..self.rows.band_count();
+        let Self { rows, present, next } = self;
+        for (axis, present, next) in [(0, &present.x, &mut next.x), (1, &present.y, &mut next.y)] {
+            let component =
+                Component { axis, seen_from: 0, present, rest: None, force: None, begin: 0, next };
+            rows.sweep(bands.clone(), 64, &mut [component], &Terms::NONE);
         }
-        begin.elapsed().as_secs_f64() / steps as f64
+        std::mem::swap(present, next);
     }
 }
 

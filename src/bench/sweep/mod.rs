@@ -149,7 +149,7 @@ impl Report {
         let updates_per_second = subject.followers as f64 / seconds_per_step;
         self.cases.push(Case {
             subject: subject.name,
-            precision: subject.precision,
+            precision: "f64",
             side: subject.side,
             threads,
             steps_together: subject.steps_together,

@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::measure::{End, Ends, Samples, Work, exchange};
+use super::ways::words;
 use super::{DDS_TURNS, Effort, Report};
 use crate::messages::builtin_interfaces::Time;
 use crate::messages::geometry_msgs::{Pose, PoseArray};
@@ -27,7 +28,6 @@ struct Dds {
 
 impl Dds {
     fn open(poses: usize, [out, back]: [&str; 2]) -> Result<Self, String> {
-        let words = |error: crate::ros::edge::EdgeError| error.to_string();
         // A domain that runs side by side are unlikely to share.
         let domain = 100 + (std::process::id() % 101) as u16;
         let edge = Edge::open(Options { domain, loopback_only: true }).map_err(words)?;
@@ -68,7 +68,7 @@ impl End for Dds {
     fn send(&mut self, mark: u64) -> Result<(), String> {
         // A stamp holds 32 bits twice.
         self.own.header.stamp = Time { sec: (mark >> 32) as i32, nanosec: mark as u32 };
-        self.publisher.publish(&self.own).map_err(|error| error.to_string())
+        self.publisher.publish(&self.own).map_err(words)
     }
 
     fn receive(&mut self, patience: Duration) -> Result<Option<u64>, String> {

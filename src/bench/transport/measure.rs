@@ -5,6 +5,8 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
+use crate::bench::machine::quantile;
+
 /// The work that is timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -111,10 +113,7 @@ pub struct Quantiles {
 impl Quantiles {
     fn of(mut times: Vec<f64>) -> Self {
         times.sort_unstable_by(f64::total_cmp);
-        let at = |share: f64| {
-            let rank = (share * times.len() as f64).ceil() as usize;
-            times.get(rank.saturating_sub(1)).copied()
-        };
+        let at = |share: f64| quantile(&times, share);
         Self { p50_seconds: at(0.5), p90_seconds: at(0.9), p99_seconds: at(0.99), p999_seconds: at(0.999) }
     }
 }

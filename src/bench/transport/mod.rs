@@ -114,8 +114,7 @@ fn take_turns(effort: &Effort, work: Work, poses: usize, report: &mut Report) {
     let mut all: Vec<Samples> = ways.iter().map(|_| Samples::default()).collect();
     for _ in 0..effort.turns {
         for (way, samples) in ways.iter().zip(&mut all) {
-            let measured = way
-                .open(poses)
+            let measured = (way.open)(poses)
                 .and_then(|(near, far)| exchange(near, far, work, effort.rounds, effort.seconds, samples));
             if let Err(why) = measured {
                 let why = format!("{}, {poses} poses: {why}", way.name);

@@ -1,4 +1,5 @@
-//! The ways that take turns: a channel, iceoryx2 as it comes, our transport, a Unix socket.
+//! The ways that take turns: a channel, iceoryx2 as it comes, our transport, a Unix socket. A message's mark travels in the
+//! first pose's stamp, to the bit.
 
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
@@ -20,43 +21,30 @@ use crate::shm::channel::{Filled, Slice};
 use crate::shm::payload::Pose;
 use crate::shm::{Capacity, Domain, Peer, Reader, Writer};
 
-pub const CHANNEL: &str = "in-process channel";
 pub const RAW: &str = "iceoryx2";
 pub const OURS: &str = "ours";
-pub const SOCKET: &str = "Unix socket";
 
 /// A way, by name.
 pub struct Way {
     pub name: &'static str,
-    open: fn(usize) -> Result<Ends, String>,
-}
-
-impl Way {
     /// Both ends, for messages of so many poses.
-    pub fn open(&self, poses: usize) -> Result<Ends, String> {
-        (self.open)(poses)
-    }
+    pub open: fn(usize) -> Result<Ends, String>,
 }
 
 pub fn all() -> [Way; 4] {
     [
-        Way { name: CHANNEL, open: open_channel },
+        Way { name: "in-process channel", open: open_channel },
         Way { name: RAW, open: open_raw },
         Way { name: OURS, open: open_ours },
-        Way { name: SOCKET, open: open_socket },
+        Way { name: "Unix socket", open: open_socket },
     ]
-}
-
-/// The mark travels in the first pose's stamp, to the bit.
-fn mark(mark: u64) -> f64 {
-    f64::from_bits(mark)
 }
 
 fn sum(poses: &[Pose]) -> f64 {
     poses.iter().map(|pose| pose.position[0] + pose.position[1] + pose.yaw).sum()
 }
 
-fn words(error: impl std::fmt::Display) -> String {
+pub fn words(error: impl std::fmt::Display) -> String {
     error.to_string()
 }
 
@@ -88,8 +76,8 @@ impl End for Channel {
         Ok(())
     }
 
-    fn send(&mut self, number: u64) -> Result<(), String> {
-        self.own[0].stamp = mark(number);
+    fn send(&mut self, mark: u64) -> Result<(), String> {
+        self.own[0].stamp = f64::from_bits(mark);
         self.to.send(std::mem::take(&mut self.own)).map_err(words)
     }
 
@@ -137,9 +125,17 @@ impl Ours {
 }
 
 fn open_ours(poses: usize) -> Result<Ends, String> {
+    open_in_domain(poses, Ours::open)
+}
+
+/// Two ends of one kind in a domain of their own.
+fn open_in_domain<E: End + 'static>(
+    poses: usize,
+    open: fn(&Domain, usize, [&str; 2]) -> Result<E, String>,
+) -> Result<Ends, String> {
     let domain = domain()?;
-    let near = Ours::open(&domain, poses, ["out", "back"])?;
-    let far = move || Ok(Box::new(Ours::open(&domain, poses, ["back", "out"])?) as Box<dyn End>);
+    let near = open(&domain, poses, ["out", "back"])?;
+    let far = move || Ok(Box::new(open(&domain, poses, ["back", "out"])?) as Box<dyn End>);
     Ok((Box::new(near), Box::new(far)))
 }
 
@@ -151,10 +147,10 @@ impl End for Ours {
         Ok(())
     }
 
-    fn send(&mut self, number: u64) -> Result<(), String> {
+    fn send(&mut self, mark: u64) -> Result<(), String> {
         let Some(mut filled) = self.own.take() else { return Err("nothing filled".into()) };
-        filled[0].stamp = mark(number);
-        self.writer.hand_over(filled, 0.0, number).map_err(words)
+        filled[0].stamp = f64::from_bits(mark);
+        self.writer.hand_over(filled, 0.0, mark).map_err(words)
     }
 
     fn receive(&mut self, patience: Duration) -> Result<Option<u64>, String> {
@@ -224,10 +220,7 @@ impl Raw {
 }
 
 fn open_raw(poses: usize) -> Result<Ends, String> {
-    let domain = domain()?;
-    let near = Raw::open(&domain, poses, ["out", "back"])?;
-    let far = move || Ok(Box::new(Raw::open(&domain, poses, ["back", "out"])?) as Box<dyn End>);
-    Ok((Box::new(near), Box::new(far)))
+    open_in_domain(poses, Raw::open)
 }
 
 impl End for Raw {
@@ -238,9 +231,9 @@ impl End for Raw {
         Ok(())
     }
 
-    fn send(&mut self, number: u64) -> Result<(), String> {
+    fn send(&mut self, mark: u64) -> Result<(), String> {
         let Some(mut filled) = self.own.take() else { return Err("nothing filled".into()) };
-        filled.payload_mut()[0].stamp = mark(number);
+        filled.payload_mut()[0].stamp = f64::from_bits(mark);
         filled.send().map_err(words)?;
         self.notifier.notify().map_err(words)?;
         Ok(())
@@ -302,8 +295,8 @@ impl End for Socket {
         Ok(())
     }
 
-    fn send(&mut self, number: u64) -> Result<(), String> {
-        self.own[BYTES - 8..BYTES].copy_from_slice(&number.to_le_bytes());
+    fn send(&mut self, mark: u64) -> Result<(), String> {
+        self.own[BYTES - 8..BYTES].copy_from_slice(&mark.to_le_bytes());
         self.stream.write_all(&self.own).map_err(words)
     }
 
@@ -328,7 +321,5 @@ impl End for Socket {
 }
 
 fn eight(bytes: &[u8]) -> [u8; 8] {
-    let mut eight = [0; 8];
-    eight.copy_from_slice(bytes);
-    eight
+    bytes.try_into().expect("eight bytes")
 }

@@ -76,10 +76,10 @@ impl Bands {
         BAR_GAP + BAR_WIDTH + 8.0 + self.widest_label() + 30.0
     }
 
-    /// Draws the colour bar to the right of a plot with this top right corner and height \[px\].
-    pub fn draw_bar(&self, svg: &mut Svg, [right, top]: [f64; 2], height: f64, quantity: &str, unit: &str) {
-        let left = right + BAR_GAP;
-        let count = self.count();
+    /// Draws the colour bar to the right of a plot.
+    pub fn draw_bar(&self, svg: &mut Svg, axes: &Axes, quantity: &str, unit: &str) {
+        let (left, top) = (axes.corner[0] + axes.size[0] + BAR_GAP, axes.corner[1]);
+        let (height, count) = (axes.size[1], self.count());
         let part = height / count as f64;
         for band in 0..count {
             let corner = [left, top + height - (band + 1) as f64 * part];
@@ -129,8 +129,7 @@ impl Field<'_> {
 
     /// Draws the colour bar beside a plot.
     pub fn draw_bar(&self, svg: &mut Svg, axes: &Axes) {
-        let top_right = [axes.corner[0] + axes.size[0], axes.corner[1]];
-        self.bands.draw_bar(svg, top_right, axes.size[1], self.quantity, self.unit);
+        self.bands.draw_bar(svg, axes, self.quantity, self.unit);
     }
 }
 

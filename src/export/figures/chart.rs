@@ -159,11 +159,7 @@ fn heading(chart: &Chart) -> Heading {
         Style::Dots | Style::Beads => Mark::Dot,
         Style::Rings | Style::Front => Mark::Ring,
     };
-    let key = |series: &Series| Key {
-        name: series.name.clone().into(),
-        colour: series.colour,
-        mark: mark(series.style),
-    };
+    let key = |series: &Series| Key::new(series.name.clone(), series.colour, mark(series.style));
     let legend = chart.series.iter().filter(|series| !series.name.is_empty()).map(key).collect();
     Heading { title: chart.title.clone(), note: chart.note.clone(), legend, ..Heading::default() }
 }

@@ -4,7 +4,7 @@ use super::axes::Axes;
 use super::colour;
 use super::configuration::{dot_radius, mark_of};
 use super::heading::{Heading, Key, Mark, draw_mark};
-use super::page;
+use super::page::{self, Bounds};
 use super::svg::{Path, Svg};
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
@@ -47,7 +47,7 @@ pub struct Pair<'a> {
 pub fn overlay(pair: &Pair<'_>) -> String {
     let factor = pair.factor();
     let [rule, truth] = [pair.rule, pair.truth].map(|u| pair.displaced(u, factor));
-    let axes = pair.window([pair.reference, &rule, &truth], Axes::equal);
+    let axes = page::around(pair.bounds([pair.reference, &rule, &truth]), pair.spacing);
     let is_dotted = pair.roles.len() <= MOST_PARTICLES;
     let mut note = "the rule's particles and the true ones".to_owned();
     if !is_dotted {
@@ -81,26 +81,19 @@ impl Pair<'_> {
     }
 
     pub(super) fn displaced(&self, displacement: &Vectors, factor: f64) -> Vectors {
-        let moved = |(p, u): ([f64; 2], [f64; 2])| [p[0] + factor * u[0], p[1] + factor * u[1]];
-        self.reference.iter().zip(displacement.iter()).map(moved).collect()
+        displaced(self.reference, displacement, factor)
     }
 
-    /// The window that holds the particles at all these places.
-    pub(super) fn window<'p>(
-        &self,
-        places: impl IntoIterator<Item = &'p Vectors>,
-        axes: impl FnOnce([f64; 2], [f64; 2], f64) -> Axes,
-    ) -> Axes {
-        let finite = |p: &[f64; 2]| p.iter().all(|value| value.is_finite());
-        let all: Vectors = places
-            .into_iter()
-            .flat_map(|points| self.drawn().map(|i| points.get(i)))
-            .filter(finite)
-            .collect();
-        let (low, high) = all.bounds(0..all.len()).unwrap_or(([0.0; 2], [1.0; 2]));
-        let longest = (high[0] - low[0]).max(high[1] - low[1]);
-        axes(low, high, (0.02 * longest).max(0.6 * self.spacing))
+    /// Lowest and highest of all these places of the particles.
+    pub(super) fn bounds<const N: usize>(&self, places: [&Vectors; N]) -> Option<Bounds> {
+        places.map(|points| page::bounds(points, self.drawn())).into_iter().fold(None, page::around_both)
     }
+}
+
+/// The places of particles that are displaced by so many times the displacement.
+pub(in crate::export) fn displaced(reference: &Vectors, displacement: &Vectors, factor: f64) -> Vectors {
+    let moved = |(p, u): ([f64; 2], [f64; 2])| [p[0] + factor * u[0], p[1] + factor * u[1]];
+    reference.iter().zip(displacement.iter()).map(moved).collect()
 }
 
 /// The factor by which displacements are drawn: 1, or 1, 2, 5 times a power of ten for those too small to be
@@ -133,15 +126,14 @@ pub(super) fn scale_note(factor: f64) -> String {
 }
 
 fn legend(pair: &Pair<'_>, is_dotted: bool) -> Vec<Key> {
-    let key = |name: &'static str, colour, mark| Key { name: name.into(), colour, mark };
-    let undeformed = key("undeformed", UNDEFORMED, Mark::DashedLine);
+    let undeformed = Key::new("undeformed", UNDEFORMED, Mark::DashedLine);
     let blue = colour::of_role(Role::Follower);
     if !is_dotted {
-        return vec![key("truth", TRUTH, Mark::Line), key("rule", blue, Mark::Line), undeformed];
+        return vec![Key::new("truth", TRUTH, Mark::Line), Key::new("rule", blue, Mark::Line), undeformed];
     }
     let led = [Role::Leader, Role::Clamped].into_iter().filter(|role| pair.roles.contains(role));
-    let led = led.map(|role| key(role.name(), colour::of_role(role), mark_of(role)));
-    let first = [key("truth", TRUTH, Mark::Ring), key("rule: follower", blue, Mark::Dot)];
+    let led = led.map(|role| Key::new(role.name(), colour::of_role(role), mark_of(role)));
+    let first = [Key::new("truth", TRUTH, Mark::Ring), Key::new("rule: follower", blue, Mark::Dot)];
     first.into_iter().chain(led).chain([undeformed]).collect()
 }
 

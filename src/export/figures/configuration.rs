@@ -7,7 +7,7 @@ use super::bands::{Bands, Field};
 use super::colour;
 use super::energy::draw_contours;
 use super::heading::{Heading, Key, Mark, draw_mark};
-use super::page;
+use super::page::{self, Bounds};
 use super::raster::Raster;
 use super::svg::{Path, Svg};
 use super::{MOST_DOTS, Subject};
@@ -67,7 +67,7 @@ pub fn configuration(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
 /// The parts that all configurations of a film share, so that nothing moves but the body.
 #[derive(Clone, Debug, Default)]
 pub struct Setting {
-    bounds: Option<[[f64; 2]; 2]>,
+    bounds: Option<Bounds>,
     /// Lowest and highest value of the field; none of frame and ghosts, which are no matter.
     range: Option<[f64; 2]>,
     roles: Vec<Role>,
@@ -93,13 +93,7 @@ impl Setting {
     /// Makes room for this configuration, and for these values of its particles, shape \[count\].
     pub fn include(&mut self, snapshot: &Snapshot, values: Option<&[f64]>) {
         let within = page::bounds(&snapshot.positions, 0..snapshot.positions.len());
-        self.bounds = match (self.bounds, within) {
-            (Some(all), Some(more)) => Some([
-                [0, 1].map(|k| f64::min(all[0][k], more[0][k])),
-                [0, 1].map(|k| f64::max(all[1][k], more[1][k])),
-            ]),
-            (all, more) => all.or(more),
-        };
+        self.bounds = page::around_both(self.bounds, within);
         let is_present = |role: &Role| self.roles.contains(role) || snapshot.roles.contains(role);
         self.roles = PAINTING_ORDER.into_iter().filter(is_present).collect();
         self.has_broken_bonds |= !snapshot.broken.is_empty();
@@ -135,25 +129,23 @@ impl Setting {
             _ => self.legend(style == Style::Raster, is_field),
         };
         let is_railed = style == Style::Dots && rails(subject).next().is_some();
-        let (name, colour) = ("held along one axis".into(), colour::of_role(Role::Clamped));
-        let rail = is_railed.then_some(Key { name, colour, mark: Mark::Line });
+        let rail = || Key::new("held along one axis", colour::of_role(Role::Clamped), Mark::Line);
+        let rail = is_railed.then(rail);
         let legend = legend.into_iter().chain(rail).collect();
         Heading { title: subject.title.into(), note, legend, least: self.heading }
     }
 
     fn legend(&self, is_raster: bool, is_field: bool) -> Vec<Key> {
-        let (colour, mark) = if is_raster {
-            (colour::BROKEN_BOND_SQUARE, Mark::Dot)
-        } else {
-            (colour::BROKEN_BOND, Mark::DashedLine)
+        let broken = match is_raster {
+            true => Key::new("broken bond", colour::BROKEN_BOND_SQUARE, Mark::Dot),
+            false => Key::new("broken bond", colour::BROKEN_BOND, Mark::DashedLine),
         };
-        let broken = Key { name: "broken bond".into(), colour, mark };
         // A field has its colours for the body.
         let is_listed = |role: &Role| !is_field || *role != Role::Follower;
         let mark = |role: Role| if is_raster { Mark::Dot } else { mark_of(role) };
         let roles = self.roles.iter().rev().copied().filter(is_listed);
         roles
-            .map(|role| Key { name: role.name().into(), colour: colour::of_role(role), mark: mark(role) })
+            .map(|role| Key::new(role.name(), colour::of_role(role), mark(role)))
             .chain(self.has_broken_bonds.then_some(broken))
             .collect()
     }

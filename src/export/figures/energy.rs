@@ -42,8 +42,7 @@ pub fn pe1(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
         } else {
             draw_contours(svg, axes, subject, (snapshot, &snapshot.pe1), &is_drawn, &bands);
         }
-        let top_right = [axes.corner[0] + axes.size[0], axes.corner[1]];
-        bands.draw_bar(svg, top_right, axes.size[1], "PE1", &format!("{}²", subject.unit));
+        bands.draw_bar(svg, axes, "PE1", &format!("{}²", subject.unit));
     })
 }
 

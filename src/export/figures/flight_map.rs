@@ -5,7 +5,7 @@ use super::bands::Field;
 use super::colour;
 use super::configuration::mark_of;
 use super::heading::{DIAMOND, Heading, Key, Mark, draw_mark};
-use super::page;
+use super::page::{self, Bounds};
 use super::svg::{Path, Svg};
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
@@ -28,7 +28,7 @@ pub fn flight(swarm: &Swarm, record: &Record, report: &FlightReport) -> String {
     let Some(last) = record.tracks.last() else { return String::new() };
     let note = format!("{}, {:.1} s", counted(report.robots, "robot"), report.seconds);
     let moment = Moment { flown: record.tracks.len(), places: last, note, field: None };
-    Map::new(swarm, record, report).draw(&moment)
+    Map::new(swarm, record, report, page::around).draw(&moment)
 }
 
 /// The map of a flight, which shows all of it at any of its times.
@@ -52,21 +52,12 @@ pub struct Moment<'a> {
 }
 
 impl<'a> Map<'a> {
-    pub fn new(swarm: &'a Swarm, record: &'a Record, report: &'a FlightReport) -> Self {
-        Self::within(swarm, record, report, page::around)
-    }
-
-    /// The map of a film.
-    pub fn of_film(swarm: &'a Swarm, record: &'a Record, report: &'a FlightReport) -> Self {
-        Self::within(swarm, record, report, page::around_in_film)
-    }
-
     /// In the window that `around` makes of the bounds of everything.
-    fn within(
+    pub fn new(
         swarm: &'a Swarm,
         record: &'a Record,
         report: &'a FlightReport,
-        around: impl FnOnce(Option<[[f64; 2]; 2]>, f64) -> Axes,
+        around: impl FnOnce(Option<Bounds>, f64) -> Axes,
     ) -> Self {
         let obstacles = (0..swarm.raw.obstacles.len()).flat_map(|k| {
             let [first, last] = outlines(swarm, k, f64::INFINITY);
@@ -108,18 +99,17 @@ impl<'a> Map<'a> {
     }
 
     fn legend(&self, is_field: bool) -> Vec<Key> {
-        let key = |name: &'static str, colour, mark| Key { name: name.into(), colour, mark };
         let [leader, follower] = [Role::Leader, Role::Follower].map(colour::of_role);
         let mut legend = vec![
-            key("leader", leader, mark_of(Role::Leader)),
-            key("follower", follower, Mark::Dot),
-            key("start", START, Mark::Ring),
+            Key::new("leader", leader, mark_of(Role::Leader)),
+            Key::new("follower", follower, Mark::Dot),
+            Key::new("start", START, Mark::Ring),
         ];
         if is_field {
             legend.remove(1);
         }
         if !self.swarm.raw.obstacles.is_empty() {
-            legend.push(key("obstacle", OBSTACLE, Mark::Dot));
+            legend.push(Key::new("obstacle", OBSTACLE, Mark::Dot));
         }
         legend
     }

@@ -18,6 +18,12 @@ pub struct Key {
     pub mark: Mark,
 }
 
+impl Key {
+    pub fn new(name: impl Into<Cow<'static, str>>, colour: &'static str, mark: Mark) -> Self {
+        Self { name: name.into(), colour, mark }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
     Dot,

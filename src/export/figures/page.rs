@@ -42,34 +42,43 @@ pub fn window(positions: &Vectors, drawn: impl Iterator<Item = usize>, spacing: 
     around(bounds(positions, drawn), spacing)
 }
 
-/// Lowest and highest place of those drawn, as far as they are anywhere.
-pub fn bounds(positions: &Vectors, drawn: impl Iterator<Item = usize>) -> Option<[[f64; 2]; 2]> {
+/// Lowest and highest place.
+pub type Bounds = [[f64; 2]; 2];
+
+/// The bounds of those drawn, as far as they are anywhere.
+pub fn bounds(positions: &Vectors, drawn: impl Iterator<Item = usize>) -> Option<Bounds> {
     let finite = |&i: &usize| positions.get(i).iter().all(|value| value.is_finite());
     positions.bounds(drawn.filter(finite)).map(|(low, high)| [low, high])
 }
 
+/// The bounds of what lies within either.
+pub fn around_both(one: Option<Bounds>, other: Option<Bounds>) -> Option<Bounds> {
+    let (Some([low, high]), Some([lower, higher])) = (one, other) else { return one.or(other) };
+    Some([[0, 1].map(|k| f64::min(low[k], lower[k])), [0, 1].map(|k| f64::max(high[k], higher[k]))])
+}
+
 /// The window that shows what lies within these bounds.
-pub fn around(bounds: Option<[[f64; 2]; 2]>, spacing: f64) -> Axes {
+pub fn around(bounds: Option<Bounds>, spacing: f64) -> Axes {
     let ([low, high], margin) = with_margin(bounds, spacing);
     Axes::equal(low, high, margin)
 }
 
 /// The same in a room of this size \[px\].
-pub fn within(bounds: Option<[[f64; 2]; 2]>, spacing: f64, room: [f64; 2]) -> Axes {
+pub fn within(bounds: Option<Bounds>, spacing: f64, room: [f64; 2]) -> Axes {
     let ([low, high], margin) = with_margin(bounds, spacing);
     Axes::fitted(low, high, margin, room)
 }
 
 /// The same in a film, which is shown whole: a sheet that is higher than a screen would be made small, and its letters
 /// with it.
-pub fn around_in_film(bounds: Option<[[f64; 2]; 2]>, spacing: f64) -> Axes {
+pub fn around_in_film(bounds: Option<Bounds>, spacing: f64) -> Axes {
     /// Room for the plot \[px\].
     const ROOM: [f64; 2] = [680.0, 560.0];
     within(bounds, spacing, ROOM)
 }
 
 /// The bounds, of nothing those of a unit, and the room around them.
-fn with_margin(bounds: Option<[[f64; 2]; 2]>, spacing: f64) -> ([[f64; 2]; 2], f64) {
+fn with_margin(bounds: Option<Bounds>, spacing: f64) -> (Bounds, f64) {
     let [low, high] = bounds.unwrap_or([[0.0; 2], [1.0; 2]]);
     let longest = (high[0] - low[0]).max(high[1] - low[1]);
     ([low, high], (0.02 * longest).max(0.6 * spacing))

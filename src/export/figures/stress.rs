@@ -3,7 +3,7 @@
 use super::Subject;
 use super::axes::Axes;
 use super::bands::{Bands, Sample};
-use super::comparison::{enlargement, scale_note};
+use super::comparison::{displaced, enlargement, scale_note};
 use super::energy::draw_bands;
 use super::heading::Heading;
 use super::page;
@@ -61,8 +61,7 @@ pub fn stress(
         } else {
             draw_cells(svg, axes, &places, &shown, &bands);
         }
-        let top_right = [axes.corner[0] + axes.size[0], axes.corner[1]];
-        bands.draw_bar(svg, top_right, axes.size[1], "von Mises stress", unit);
+        bands.draw_bar(svg, axes, "von Mises stress", unit);
     })
 }
 
@@ -97,13 +96,16 @@ pub(super) fn drawn(snapshot: &Snapshot) -> impl Iterator<Item = usize> {
 
 /// Where particles are drawn, and the factor by which their displacements are enlarged for that.
 pub(super) fn enlarged(subject: &Subject<'_>, snapshot: &Snapshot) -> (Vectors, f64) {
-    let reference = &subject.body.reference;
-    let moved = |(now, then): ([f64; 2], [f64; 2])| [now[0] - then[0], now[1] - then[1]];
-    let displacement: Vectors = snapshot.positions.iter().zip(reference.iter()).map(moved).collect();
+    let (reference, displacement) = (&subject.body.reference, displacement(subject, snapshot));
     // Large displacements are drawn as they are: a bent body is to look as bent as it is.
     let factor = enlargement(reference, &displacement, || drawn(snapshot)).max(1.0);
-    let place = |(then, by): ([f64; 2], [f64; 2])| [then[0] + factor * by[0], then[1] + factor * by[1]];
-    (reference.iter().zip(displacement.iter()).map(place).collect(), factor)
+    (displaced(reference, &displacement, factor), factor)
+}
+
+/// Displacement of every particle \[length\], shape \[count\].
+pub(in crate::export) fn displacement(subject: &Subject<'_>, snapshot: &Snapshot) -> Vectors {
+    let moved = |(now, then): ([f64; 2], [f64; 2])| [now[0] - then[0], now[1] - then[1]];
+    snapshot.positions.iter().zip(subject.body.reference.iter()).map(moved).collect()
 }
 
 fn draw_cells(svg: &mut Svg, axes: &Axes, places: &Vectors, shown: &[(&[u32], f64)], bands: &Bands) {

@@ -40,7 +40,11 @@ impl Column {
         let mut categories: Vec<String> = Vec::new();
         let values = levels.iter().map(|level| {
             let known = categories.iter().position(|word| *word == level.text);
-            Some(1.0 + known.unwrap_or_else(|| new(&mut categories, &level.text)) as f64)
+            let new = || {
+                categories.push(level.text.clone());
+                categories.len() - 1
+            };
+            Some(1.0 + known.unwrap_or_else(new) as f64)
         });
         let values = values.collect();
         Self { name, is_log: false, values, categories }
@@ -78,11 +82,6 @@ impl Column {
         let numbered: Vec<String> = numbered.collect();
         (!numbered.is_empty()).then(|| format!("{}: {}", self.name, numbered.join(", ")))
     }
-}
-
-fn new(categories: &mut Vec<String>, word: &str) -> usize {
-    categories.push(word.to_owned());
-    categories.len() - 1
 }
 
 /// The runs of a sweep, column by column.
@@ -176,8 +175,7 @@ fn heat_map(swept: &Swept<'_>, keys: [&Column; 2], output: &Column) -> String {
         &mut svg,
         [Measure { quantity: &names[0], unit: "" }, Measure { quantity: &names[1], unit: "" }],
     );
-    let right = axes.corner[0] + axes.size[0];
-    bands.draw_bar(&mut svg, [right, axes.corner[1]], HEIGHT, &output.name, "");
+    bands.draw_bar(&mut svg, &axes, &output.name, "");
     svg.finish()
 }
 

@@ -1,8 +1,8 @@
 //! The von Mises stress by a rule beside the true one, as in the paper's figures 12, 14, 16 and 18.
 
-use super::axes::Axes;
 use super::comparison::{Pair, scale_note};
 use super::heading::Heading;
+use super::page;
 use super::panels::{Panel, Scale, Sheet, arranged};
 
 /// Name of the third panel and of its scale.
@@ -22,9 +22,8 @@ pub fn von_mises(pair: &Pair<'_>, rule: &[f64], truth: &[f64]) -> String {
         Panel { name: DIFFERENCE, stress: &apart, places: &in_truth, scale: 1 },
     ];
     let scales = vec![scale_of(rule, truth), Scale::from_zero(DIFFERENCE, largest(&apart), 5.0)];
-    let window =
-        |room| pair.window([&by_rule, &in_truth], |low, high, margin| Axes::fitted(low, high, margin, room));
-    let (axes, is_row) = arranged(window);
+    let bounds = pair.bounds([&by_rule, &in_truth]);
+    let (axes, is_row) = arranged(|room| page::within(bounds, pair.spacing, room));
     let heading = Heading {
         title: pair.title.into(),
         note: format!("von Mises stress at the centres of the cells{}", scale_note(factor)),

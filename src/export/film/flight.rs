@@ -3,6 +3,7 @@
 use super::{Film, FilmColour, Scale, chosen};
 use crate::export::figures::bands::Bands;
 use crate::export::figures::flight_map::{Map, Moment};
+use crate::export::figures::page;
 use crate::export::report::FlightRecorder;
 use crate::flock::vectors::Vectors;
 use crate::scene::swarm::Swarm;
@@ -39,7 +40,7 @@ pub fn film<'a>(
         let moved = dx.into_iter().zip(dy);
         recorder.start().iter().zip(moved).map(|([x, y], (dx, dy))| [x + dx, y + dy]).collect()
     };
-    let map = Map::of_film(swarm, record, report);
+    let map = Map::new(swarm, record, report, page::around_in_film);
     let count = frames.len();
     let draw = move |n: usize| {
         let (frame, values) = (frames[n], values(frames[n]));

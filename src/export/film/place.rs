@@ -1,6 +1,5 @@
 //! The file of a film: refused before the run where it could not be written, whole or not there afterwards.
 
-use std::ffi::OsString;
 use std::fs::{self, File, TryLockError};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -9,6 +8,7 @@ use super::error::FilmError;
 use super::gif::GifEncoder;
 use super::video::{self, VideoEncoder};
 use super::{Encoder, Picture};
+use crate::export::folder::beside;
 
 /// The kind of film that a name asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,10 +75,7 @@ impl FilmFile {
             FilmFormat::Gif => None,
             _ => Some(video::codec(format, &path)?),
         };
-        let mut name = OsString::from(".");
-        name.push(path.file_name().unwrap_or_default());
-        name.push(".partial");
-        let part = path.with_file_name(name);
+        let part = beside(&path, "partial", 0);
         // What a killed program left there is overwritten, but no folder and no link.
         if part.symlink_metadata().is_ok_and(|found| !found.is_file()) {
             return Err(FilmError::Taken(part));

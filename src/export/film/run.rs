@@ -10,7 +10,7 @@ use crate::continuum::record::Snapshot;
 use crate::continuum::run::Outcome;
 use crate::engine::Engine;
 use crate::export::figures::configuration::{Setting, configuration_in};
-use crate::export::figures::{Subject, page};
+use crate::export::figures::{Subject, displaced, page};
 use crate::export::report::RunRecorder;
 use crate::flock::pseudo_energy::pe1_among;
 use crate::flock::strain::strain_among;
@@ -86,11 +86,9 @@ impl Shown<'_> {
     /// The configuration, without the energies, which the figure does not show.
     fn snapshot(&self, frame: usize) -> Snapshot {
         let step = self.recorder.frames()[frame].step;
-        let rest = self.engine.body().reference.iter();
-        let place = |(then, by): ([f64; 2], [f64; 2])| [then[0] + by[0], then[1] + by[1]];
         Snapshot {
             step,
-            positions: rest.zip(self.displacement(frame).iter()).map(place).collect(),
+            positions: displaced(&self.engine.body().reference, &self.displacement(frame), 1.0),
             roles: self.recorder.roles_at(step),
             pe1: Vec::new(),
             pe2: Vec::new(),

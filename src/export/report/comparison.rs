@@ -153,9 +153,6 @@ fn facts(scene: &Scene, report: &ComparisonReport) -> Vec<(String, String)> {
 
 fn measures(report: &ComparisonReport) -> Table {
     let rows = report.comparison.rows(|part| format!("{} %", number(100.0 * part)), number);
-    Table {
-        caption: "How far the rule is from the truth".into(),
-        head: vec!["measure".into(), "value".into()],
-        rows: rows.map(|(name, value)| vec![name.replace("  ", "\u{2026} "), value]).into(),
-    }
+    let rows = rows.map(|(name, value)| vec![name.replace("  ", "\u{2026} "), value]);
+    Table::new("How far the rule is from the truth", &["measure", "value"], rows)
 }

@@ -7,13 +7,13 @@ use super::super::figures::flight_map::{moves, outline};
 use super::super::{OutputFolder, flight};
 use super::encoded;
 use super::frames::{Channel, Frame, Frames};
-use super::page::{Page, Table, number, scene_text};
+use super::page::{Page, Table, file_texts, number};
 use super::view::{Animation, Clock, Outline, Quantity, View};
 use crate::flock::role::Role;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::swarm::Swarm;
 use crate::swarm::control::Control;
-use crate::swarm::flight::{Flight, FlightReport, Record};
+use crate::swarm::flight::{Flight, FlightReport, Record, RobotReport, Verdict};
 
 /// Bits of every quantity.
 const BITS: u32 = 24;
@@ -264,8 +264,8 @@ pub fn write(
         plots,
         facts: facts(report),
         tables: tables(report),
-        texts: texts(swarm),
-        live: None,
+        texts: file_texts(["swarm", "Swarm"], &swarm.raw.notes, &swarm.raw),
+        ..Page::default()
     };
     page.write(folder)
 }
@@ -295,47 +295,33 @@ fn facts(report: &FlightReport) -> Vec<(String, String)> {
 }
 
 fn tables(report: &FlightReport) -> Vec<Table> {
-    let head = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
     let mut tables = Vec::new();
     if !report.bounds.is_empty() {
-        let row = |v: &crate::swarm::flight::Verdict| {
+        let row = |v: &Verdict| {
             let found = v.found.map_or_else(|| "not measured".into(), number);
-            vec![
-                v.bound.to_owned(),
-                number(v.declared),
-                found,
-                if v.holds { "holds" } else { "broken" }.into(),
-            ]
+            let word = if v.holds { "holds" } else { "broken" };
+            vec![v.bound.to_owned(), number(v.declared), found, word.into()]
         };
-        tables.push(Table {
-            caption: "Declared bounds".into(),
-            head: head(&["bound", "declared", "found", ""]),
-            rows: report.bounds.iter().map(row).collect(),
-        });
+        let head = ["bound", "declared", "found", ""];
+        tables.push(Table::new("Declared bounds", &head, report.bounds.iter().map(row)));
     }
-    let row = |robot: &crate::swarm::flight::RobotReport| {
-        let clearance = robot.clearance.map_or_else(String::new, number);
-        let counts = [robot.accepted, robot.rejected].map(|count| count.to_string());
-        let [accepted, rejected] = counts;
-        let (name, role) = (robot.name.clone(), robot.role.to_owned());
+    let row = |robot: &RobotReport| {
         vec![
-            name,
-            role,
+            robot.name.clone(),
+            robot.role.to_owned(),
             number(robot.x),
             number(robot.y),
             number(robot.way),
-            clearance,
-            accepted,
-            rejected,
+            robot.clearance.map_or_else(String::new, number),
+            robot.accepted.to_string(),
+            robot.rejected.to_string(),
             robot.health.into(),
         ]
     };
-    let rows: Vec<_> = report.per_robot.iter().take(MOST_ROWS).map(row).collect();
-    let more = report.robots.saturating_sub(rows.len());
-    let caption = if more > 0 {
-        format!("Robots at the end ({more} more in robots.csv)")
-    } else {
-        "Robots at the end".into()
+    let rows = report.per_robot.iter().take(MOST_ROWS).map(row);
+    let caption = match report.robots.saturating_sub(rows.len()) {
+        0 => "Robots at the end".to_owned(),
+        more => format!("Robots at the end ({more} more in robots.csv)"),
     };
     let names = [
         "name",
@@ -348,17 +334,8 @@ fn tables(report: &FlightReport) -> Vec<Table> {
         "rejected",
         "health",
     ];
-    tables.push(Table { caption, head: head(&names), rows });
+    tables.push(Table::new(&caption, &names, rows));
     tables
-}
-
-fn texts(swarm: &Swarm) -> Vec<(String, String)> {
-    let mut texts = Vec::new();
-    if !swarm.raw.notes.is_empty() {
-        texts.push(("Notes of the swarm".into(), swarm.raw.notes.trim().to_owned()));
-    }
-    texts.push(("Swarm, with its defaults and overrides".into(), scene_text(&swarm.raw)));
-    texts
 }
 
 #[cfg(test)]

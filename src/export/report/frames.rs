@@ -13,7 +13,7 @@ pub const MOST_FRAMES: usize = 512;
 const MOST_BYTES: usize = 400 << 20;
 
 /// A quantity that frames hold for every particle.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Channel {
     pub name: &'static str,
     /// Of a code, 2 to 24.

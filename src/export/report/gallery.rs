@@ -100,21 +100,19 @@ fn picture(outputs: &Path) -> Result<PathBuf, ExportError> {
         return Ok(flight);
     }
     let entries = std::fs::read_dir(outputs).map_err(ExportError::io("look into", outputs))?;
-    let mut drawn: Vec<PathBuf> = entries
-        .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter(|path| path.extension().is_some_and(|ending| ending == "svg"))
-        .filter(|path| {
-            path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("configuration_"))
-        })
-        .collect();
+    let is_configuration = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with("configuration_") && name.ends_with(".svg")
+    };
+    let mut drawn: Vec<PathBuf> =
+        entries.filter_map(|entry| Some(entry.ok()?.path())).filter(is_configuration).collect();
     drawn.sort();
     let is_torn = outputs.join("breaks.csv").is_file();
     let number = if is_torn { drawn.len().wrapping_sub(1) } else { drawn.len().saturating_sub(2) };
-    let reason = || "the run left no configuration".to_owned();
-    drawn
-        .get(number)
-        .cloned()
-        .ok_or_else(|| ExportError::Figure { path: outputs.to_owned(), reason: reason() })
+    drawn.get(number).cloned().ok_or_else(|| ExportError::Figure {
+        path: outputs.to_owned(),
+        reason: "the run left no configuration".to_owned(),
+    })
 }
 
 #[cfg(test)]

@@ -81,8 +81,18 @@ pub(crate) struct Page {
 #[derive(Debug, Default)]
 pub(crate) struct Table {
     pub caption: String,
-    pub head: Vec<String>,
+    pub head: Vec<&'static str>,
     pub rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    pub(super) fn new(
+        caption: &str,
+        head: &[&'static str],
+        rows: impl IntoIterator<Item = Vec<String>>,
+    ) -> Self {
+        Self { caption: caption.to_owned(), head: head.to_vec(), rows: rows.into_iter().collect() }
+    }
 }
 
 impl Page {
@@ -208,7 +218,7 @@ fn table_html(table: &Table) -> String {
     let heads: String =
         table.head.iter().map(|name| format!("<th scope=\"col\">{}</th>", escaped(name))).collect();
     // On a narrow screen every cell stands in a line of its own, behind the name of its column.
-    let cell = |(name, text): (&String, &String)| {
+    let cell = |(name, text): (&&str, &String)| {
         let class = if text.parse::<f64>().is_ok() { " class=\"number\"" } else { "" };
         format!("<td data-name=\"{}\"{class}>{}</td>", escaped(name), escaped(text))
     };
@@ -235,6 +245,17 @@ pub fn number(value: f64) -> String {
     }
     let text = format!("{value:.*}", usize::try_from(5 - exponent).unwrap_or(0));
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+}
+
+/// The notes of a scene or swarm and its file, under its name within and at the beginning of a title.
+pub(super) fn file_texts(
+    [within, first]: [&str; 2],
+    notes: &str,
+    raw: &impl Serialize,
+) -> Vec<(String, String)> {
+    let notes = (!notes.is_empty()).then(|| (format!("Notes of the {within}"), notes.trim().to_owned()));
+    let file = (format!("{first}, with its defaults and overrides"), scene_text(raw));
+    notes.into_iter().chain([file]).collect()
 }
 
 /// A scene or swarm as it was read, defaults and overrides included, without what it leaves out.

@@ -14,7 +14,7 @@ use super::super::{OutputFolder, Results, Signed, Summary};
 use super::encode::GROUP;
 use super::encoded;
 use super::frames::{Channel, Frame, Frames, MOST_FRAMES};
-use super::page::{Page, number, scene_text};
+use super::page::{Page, file_texts, number};
 use super::view::{Animation, Clock, Quantity, Stress, View};
 use crate::continuum::mechanics::Stresses;
 use crate::continuum::memory::{measured, neighbour_entries};
@@ -150,8 +150,7 @@ impl RunRecorder {
     pub fn watch(&mut self, engine: &Engine) {
         if self.frames.wants(engine.step()) {
             self.take(engine, 1.0);
-            let values: Vec<&[f64]> = self.values.iter().map(Vec::as_slice).collect();
-            self.frames.keep(engine.step(), &values);
+            self.frames.keep(engine.step(), &slices(&self.values));
         }
     }
 
@@ -177,13 +176,11 @@ impl RunRecorder {
             self.frames = Frames::new(self.frames.count, self.frames.channels.clone());
             for frame in 0..=LOAD_FRAMES {
                 self.take(engine, frame as f64 / LOAD_FRAMES as f64);
-                let values: Vec<&[f64]> = self.values.iter().map(Vec::as_slice).collect();
-                self.frames.keep(frame, &values);
+                self.frames.keep(frame, &slices(&self.values));
             }
         } else {
             self.take(engine, 1.0);
-            let values: Vec<&[f64]> = self.values.iter().map(Vec::as_slice).collect();
-            self.frames.keep_last(engine.step(), &values);
+            self.frames.keep_last(engine.step(), &slices(&self.values));
         }
         // Nothing is taken any more, and the page is yet to be packed.
         self.values.iter_mut().for_each(|values| *values = Vec::new());
@@ -285,14 +282,17 @@ impl RunRecorder {
         }
         let encoded = encoded(&mut self.frames, stage.size());
         let steps = self.frames.kept().iter().map(|frame| frame.step as f64);
-        let times = if is_solved {
-            steps.map(|step| 100.0 * step / LOAD_FRAMES as f64).collect()
-        } else {
-            steps.collect()
+        let times = match is_solved {
+            true => steps.map(|step| 100.0 * step / LOAD_FRAMES as f64).collect(),
+            false => steps.collect(),
         };
         stage.set_frames(&self.frames, encoded, times);
         stage
     }
+}
+
+fn slices(values: &[Vec<f64>]) -> Vec<&[f64]> {
+    values.iter().map(Vec::as_slice).collect()
 }
 
 /// Whether the equilibrium was found without intermediate states.
@@ -406,14 +406,12 @@ pub fn write(
         title: scene.raw.title.clone(),
         command: format!("flockform run {}", scene.name),
         verdict: Some(verdict(outcome, summary)),
-        moments: Vec::new(),
         note: note(&stage.animation, outcome, is_solved_at_once(scene, outcome)),
         stages: vec![stage],
         plots,
         facts: facts(scene, outcome, summary),
-        tables: Vec::new(),
         texts: texts(scene, summary),
-        live: None,
+        ..Page::default()
     };
     page.write(folder)
 }
@@ -514,11 +512,7 @@ fn facts(scene: &Scene, outcome: &Outcome, summary: &Summary) -> Vec<(String, St
 }
 
 fn texts(scene: &Scene, summary: &Summary) -> Vec<(String, String)> {
-    let mut texts = Vec::new();
-    if !scene.raw.notes.is_empty() {
-        texts.push(("Notes of the scene".into(), scene.raw.notes.trim().to_owned()));
-    }
-    texts.push(("Scene, with its defaults and overrides".into(), scene_text(&scene.raw)));
+    let mut texts = file_texts(["scene", "Scene"], &scene.raw.notes, &scene.raw);
     let mut value = serde_json::to_value(Signed::new(summary)).unwrap_or_default();
     if let serde_json::Value::Object(table) = &mut value {
         table.remove("scene");

@@ -6,7 +6,7 @@ use super::super::OutputFolder;
 use super::super::error::ExportError;
 use super::super::stability::panels;
 use super::page::{Page, Table, number};
-use crate::study::stability::extremes::Outcome;
+use crate::study::stability::extremes::Case;
 use crate::study::stability::study::Study;
 
 /// Writes `report.html`.
@@ -47,7 +47,6 @@ fn facts(study: &Study) -> Vec<(String, String)> {
 }
 
 fn tables(study: &Study) -> Vec<Table> {
-    let head = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
     let mut tables = Vec::new();
     if let Some(linear) = &study.linear {
         let exact = |value: f64| format!("{value:.9}");
@@ -63,28 +62,16 @@ fn tables(study: &Study) -> Vec<Table> {
                 agrees.into(),
             ]
         });
-        tables.push(Table {
-            caption: "Thresholds".into(),
-            head: head(&["parameter", "predicted by the spectrum", "found by runs", "may differ by", ""]),
-            rows: rows.collect(),
-        });
+        let head = ["parameter", "predicted by the spectrum", "found by runs", "may differ by", ""];
+        tables.push(Table::new("Thresholds", &head, rows));
     }
-    let rows: Vec<Vec<String>> = study
-        .extremes
-        .iter()
-        .map(|case| {
-            let word = match &case.outcome {
-                Outcome::Right { .. } => "right",
-                Outcome::Refused { .. } => "refused",
-                Outcome::Wrong { .. } => "WRONG",
-            };
-            let said = case.outcome.to_string();
-            let said = said.split_once(": ").map_or(said.clone(), |(_, rest)| rest.to_owned());
-            vec![case.name.clone(), case.body.clone(), word.into(), said]
-        })
-        .collect();
-    if !rows.is_empty() {
-        tables.push(Table { caption: "Extremes".into(), head: head(&["what", "on", "", "how"]), rows });
+    let row = |case: &Case| {
+        let words = case.outcome.to_string();
+        let (word, how) = words.split_once(": ").unwrap_or_default();
+        vec![case.name.clone(), case.body.clone(), word.into(), how.into()]
+    };
+    if !study.extremes.is_empty() {
+        tables.push(Table::new("Extremes", &["what", "on", "", "how"], study.extremes.iter().map(row)));
     }
     tables
 }

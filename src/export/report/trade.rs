@@ -34,20 +34,18 @@ fn facts(study: &Study) -> Vec<(String, String)> {
 }
 
 fn tables(study: &Study) -> Vec<Table> {
-    let head = || {
-        [
-            "rule",
-            "spacing",
-            "particles",
-            "solver",
-            "tolerance",
-            "bits",
-            "error",
-            "time",
-            "iterations",
-            "outcome",
-        ]
-    };
+    let head = [
+        "rule",
+        "spacing",
+        "particles",
+        "solver",
+        "tolerance",
+        "bits",
+        "error",
+        "time",
+        "iterations",
+        "outcome",
+    ];
     let row = |point: &Point| {
         let setting = &point.setting;
         let outcome = match &point.outcome {
@@ -68,13 +66,8 @@ fn tables(study: &Study) -> Vec<Table> {
             outcome,
         ]
     };
-    let table = |caption: &str, rows: Vec<Vec<String>>| Table {
-        caption: caption.into(),
-        head: head().map(String::from).to_vec(),
-        rows,
-    };
     vec![
-        table("Pareto-optimal settings", study.front().into_iter().map(row).collect()),
-        table("Every setting", study.points.iter().map(row).collect()),
+        Table::new("Pareto-optimal settings", &head, study.front().into_iter().map(row)),
+        Table::new("Every setting", &head, study.points.iter().map(row)),
     ]
 }

@@ -28,7 +28,7 @@ pub(crate) struct Animation {
     pub radii: Vec<f64>,
     /// The clock's value at every frame, shape \[frames\].
     pub times: Vec<f64>,
-    pub channels: Vec<ChannelName>,
+    pub channels: Vec<Channel>,
     /// Shapes \[frames * channels\].
     pub exponents: Vec<i32>,
     pub bases: Vec<i64>,
@@ -56,12 +56,6 @@ pub(crate) struct Animation {
 pub(crate) struct Clock {
     pub quantity: &'static str,
     pub unit: &'static str,
-}
-
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct ChannelName {
-    pub name: &'static str,
-    pub bits: u32,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -115,11 +109,10 @@ impl View {
     /// The frames, and the clock's value at each of them.
     pub(crate) fn set_frames(&mut self, frames: &Frames, encoded: EncodedFrames, times: Vec<f64>) {
         let tracks = || frames.kept().iter().flat_map(|frame| &frame.tracks);
-        let name = |channel: &Channel| ChannelName { name: channel.name, bits: channel.bits };
         let animation = &mut self.animation;
         animation.count = frames.count;
         animation.times = times;
-        animation.channels = frames.channels.iter().map(name).collect();
+        animation.channels = frames.channels.clone();
         animation.exponents = tracks().map(|track| track.exponent).collect();
         animation.bases = tracks().map(|track| track.base).collect();
         animation.modes = encoded.modes;

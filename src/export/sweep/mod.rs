@@ -16,10 +16,10 @@ pub use journal::{Journal, JournalHeader, Row, StoredSweep, SweepError, SweepReq
 pub use outputs::{Output, OutputError, Probed, Quantity, Values};
 
 use super::OutputFolder;
+use super::csv::write_below;
 use super::error::ExportError;
 use super::figures::sweep::{Column, Swept, draw};
 use super::figures::{self, Formats};
-use super::manifest::create;
 use crate::study::design::{Design, Level};
 
 /// The runs of a sweep.
@@ -107,14 +107,7 @@ pub fn write_sweep(
     formats: Formats,
     plotted: Option<&str>,
 ) -> Result<Vec<PathBuf>, ExportError> {
-    let path = folder.path("sweep.csv");
-    let mut writer = csv::Writer::from_writer(create(&path).map_err(ExportError::io("write", &path))?);
-    writer.write_record(table.head()).map_err(ExportError::io("write", &path))?;
-    for cells in table.cells() {
-        writer.write_record(cells).map_err(ExportError::io("write", &path))?;
-    }
-    writer.flush().map_err(ExportError::io("write", &path))?;
-    let mut written = vec![path.clone()];
+    let mut written = vec![write_below(&table.head(), folder, "sweep.csv", table.cells())?];
     if let Some(figure) = table.figure(plotted).filter(|_| formats != Formats::None) {
         written.extend(figures::write_as(&figure, folder, "sweep", formats)?);
     }

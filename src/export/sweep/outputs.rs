@@ -136,9 +136,7 @@ impl Output {
         let fracture = of_fracture.into_iter().filter(|_| scene.fracture.is_some());
         always.into_iter().chain(material).chain(fracture).map(str::to_owned).collect()
     }
-}
 
-impl Output {
     /// Refuses a step that a run of this scene cannot come to.
     ///
     /// # Errors

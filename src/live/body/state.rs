@@ -168,16 +168,9 @@ impl State {
         let taken_at = self.ahead().get(&particles[0]).copied().unwrap_or_default();
         let ids = particles.iter().map(|&i| self.engine.body().id(i)).collect();
         let frames = vec![Keyframe { step: 1.0, displacement: [0.0; 2] }];
-        self.hands.push(RawRoles {
-            region: RawRegion::Ids { ids },
-            role: RawRole::Leader,
-            axis: None,
-            from,
-            when: None,
-            motion: None,
-        });
-        let (motion, particles) = (Some(motion(frames.clone())), particles.to_vec());
-        let change = RoleChange { particles, role: Role::Leader, axis: None, from, when: None, motion };
+        self.hands.push(raw_role(RawRegion::Ids { ids }, RawRole::Leader, from));
+        let motion = Some(motion(frames.clone()));
+        let change = RoleChange { motion, ..role_change(particles.to_vec(), Role::Leader, from) };
         let change = self.engine.add_role_change(change);
         Lead { change, hand: self.hands.len() - 1, frames, since: from - 1, from: taken_at }
     }
@@ -203,24 +196,9 @@ impl State {
             return;
         }
         let region = self.hands[lead.hand].region.clone();
-        self.hands.push(RawRoles {
-            region,
-            role: RawRole::Follower,
-            axis: None,
-            from,
-            when: None,
-            motion: None,
-        });
+        self.hands.push(raw_role(region, RawRole::Follower, from));
         let particles = self.engine.changes()[lead.change].particles.clone();
-        let role = Role::Follower;
-        self.engine.add_role_change(RoleChange {
-            particles,
-            role,
-            axis: None,
-            from,
-            when: None,
-            motion: None,
-        });
+        self.engine.add_role_change(role_change(particles, Role::Follower, from));
     }
 
     /// Particles that hands have taken on since the last step, and how far they are to go \[length\].
@@ -354,6 +332,16 @@ impl Lead {
     fn last_step(&self) -> usize {
         self.since + self.frames.last().map_or(0, |frame| frame.step as usize)
     }
+}
+
+/// A role that is taken at a step, without motion.
+fn raw_role(region: RawRegion, role: RawRole, from: usize) -> RawRoles {
+    RawRoles { region, role, axis: None, from, when: None, motion: None }
+}
+
+/// The same in the engine.
+fn role_change(particles: Vec<usize>, role: Role, from: usize) -> RoleChange {
+    RoleChange { particles, role, axis: None, from, when: None, motion: None }
 }
 
 /// Jumps, so that each place is one that the hand was at.

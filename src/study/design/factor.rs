@@ -16,7 +16,7 @@ pub struct Level {
 
 impl Level {
     fn written(text: &str) -> Self {
-        Self { text: text.to_owned(), number: text.parse().ok().filter(|number: &f64| number.is_finite()) }
+        Self { text: text.to_owned(), number: finite(text) }
     }
 
     /// The shortest text that reads back as the number; a whole one is written as an integer, which keys of both kinds
@@ -73,6 +73,10 @@ impl FromStr for Factor {
     }
 }
 
+fn finite(text: &str) -> Option<f64> {
+    text.parse().ok().filter(|number: &f64| number.is_finite())
+}
+
 /// Ends, number of values and scale of `a:b:n:log`, in which the last two may be missing.
 fn range(text: &str) -> Result<([f64; 2], Option<usize>, bool), String> {
     let mut parts: Vec<&str> = text.split(':').map(str::trim).collect();
@@ -80,10 +84,7 @@ fn range(text: &str) -> Result<([f64; 2], Option<usize>, bool), String> {
     if is_log {
         parts.pop();
     }
-    let number = |part: &str| {
-        let number: Option<f64> = part.parse().ok().filter(|number: &f64| number.is_finite());
-        number.ok_or_else(|| format!("`{part}` is no number"))
-    };
+    let number = |part: &str| finite(part).ok_or_else(|| format!("`{part}` is no number"));
     let (ends, count) = match parts[..] {
         [from, to] => ([number(from)?, number(to)?], None),
         [from, to, count] => {

@@ -6,7 +6,7 @@
 //! that of a solved body, to which the truth's own is added: what is delivered is what was measured.
 
 use super::grid::{RuleChoice, body_overrides};
-use super::study::{Load as LoadScene, error_of};
+use super::study::{Load as LoadScene, error_of, reason};
 use crate::continuum::equilibrium::solve_equilibrium;
 use crate::continuum::layout::Layout;
 use crate::continuum::run::Outcome;
@@ -175,8 +175,7 @@ impl<'a> Body<'a> {
             let solved = match self.solve(&more) {
                 Ok(solved) => solved,
                 Err(error) => {
-                    last =
-                        error.problems().first().map_or_else(String::new, |problem| problem.message.clone());
+                    last = reason(&error);
                     continue;
                 }
             };

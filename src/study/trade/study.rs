@@ -11,8 +11,7 @@ use crate::flock::role::Role;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::{Scene, SceneError};
 use crate::solve::stopwatch::Stopwatch;
-use crate::study::compare::reference::Effort;
-use crate::study::compare::reference::Reference;
+use crate::study::compare::reference::{Effort, Reference};
 use crate::study::compare::run::{SceneReference, plan_led_by, reference_of};
 
 /// The outcome of a setting.
@@ -88,15 +87,14 @@ pub fn run(load: Load<'_>, grid: &Grid, progress: &mut dyn FnMut(&Setting)) -> R
         repeats: grid.repeats,
         points: Vec::new(),
     };
-    let mut least_left_out: Option<usize> = None;
+    let mut left_out = Vec::new();
     for rule in RuleChoice::ALL {
         for &spacing in &grid.spacings {
             let overrides = body_overrides(&scene, rule, spacing);
             let particles = match load(&overrides).and_then(|scene| plan_led_by(&scene, &truth.solution)) {
                 Ok(plan) if plan.count() <= grid.max_particles => plan.count(),
                 Ok(plan) => {
-                    least_left_out =
-                        Some(least_left_out.map_or(plan.count(), |least| least.min(plan.count())));
+                    left_out.push(plan.count());
                     continue;
                 }
                 Err(error) => {
@@ -119,7 +117,7 @@ pub fn run(load: Load<'_>, grid: &Grid, progress: &mut dyn FnMut(&Setting)) -> R
         }
     }
     let is_tried = |point: &Point| !matches!(point.outcome, Outcome::Refused { .. });
-    match least_left_out {
+    match left_out.into_iter().min() {
         Some(least) if !study.points.iter().any(is_tried) => Err(scene.refuse(
             "body",
             format!(
@@ -155,7 +153,7 @@ fn refused(rule: RuleChoice, spacing: f64, error: &SceneError) -> Point {
 }
 
 /// The message of an error without its place, which is in an override of the study's own.
-fn reason(error: &SceneError) -> String {
+pub(super) fn reason(error: &SceneError) -> String {
     error.problems().first().map_or_else(String::new, |problem| problem.message.clone())
 }
 

@@ -1,13 +1,12 @@
 //! Degenerate bodies and leaders: coincident leaders, one follower, no leaders, far from the origin.
 
-use super::{AT_REST, Case, End, MATERIAL, Outcome, SHEET, patch, small, worst};
+use super::{AT_REST, Case, End, MATERIAL, OWN, Outcome, SHEET, patch, small, worst};
 use crate::flock::rules::Mean;
 use crate::flock::vectors::distance;
 use crate::scene::{Scene, SceneError};
 use crate::study::stability::scaling;
 use crate::study::stability::subject::Subject;
 
-const OWN: &str = "a small body of its own";
 const OF_THE_RULE: &str = "a small body of its own with the scene's mean";
 
 /// All of the outline in one point.

@@ -1,6 +1,6 @@
 //! Materials at the end of their range, and cells and bodies out of all proportion.
 
-use super::{AT_REST, Case, End, MATERIAL, Outcome, SHEET, patch, plan, small, worst};
+use super::{AT_REST, Case, End, MATERIAL, OWN, Outcome, SHEET, patch, plan, small, worst};
 use crate::flock::body::{Body, Cut};
 use crate::flock::lattice::{Lattice, LatticeKind};
 use crate::flock::law::{Flock, Weights};
@@ -15,7 +15,6 @@ use crate::solve::linear::system;
 use crate::study::stability::scaling;
 use crate::study::stability::subject::Subject;
 
-const OWN: &str = "a small body of its own";
 const OF_THE_LATTICE: &str = "a small body of its own on the scene's lattice";
 
 pub fn cases(scene: &Scene) -> Vec<Case> {
@@ -114,6 +113,14 @@ fn damped(overrides: &[&str]) -> Result<Outcome, SceneError> {
 /// Three parts in a row, the middle one so many times as stiff, between a clamp and an end that is led: without
 /// lateral contraction each part stretches as its compliance has it.
 pub fn contrast(solver: Solver, contrast: f64) -> Outcome {
+    match stretched(solver, contrast) {
+        Ok(error) => Outcome::judged(error, 1e-3, "each part stretches by its compliance, over the pull"),
+        Err(message) => Outcome::Refused { message },
+    }
+}
+
+/// How far the three parts are from that, over the pull \[1\].
+fn stretched(solver: Solver, contrast: f64) -> Result<f64, String> {
     let columns = 13u32;
     let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0; 2], 0.0);
     let around = neighbourhood(&lattice);
@@ -123,10 +130,8 @@ pub fn contrast(solver: Solver, contrast: f64) -> Outcome {
     let sheet = Elastic::new(constants, 1.0).expect("admissible");
     let stiffness = |x: f64| if (4.0..8.0).contains(&x) { contrast } else { 1.0 };
     let factor: Vec<f64> = cells.iter().map(|cell| stiffness(body.reference.x[cell[0] as usize])).collect();
-    let weights = match MaterialWeights::on_points(&cells, &body.reference, &sheet, Some(&factor)) {
-        Ok(weights) => weights,
-        Err(error) => return Outcome::Refused { message: error.to_string() },
-    };
+    let weights = MaterialWeights::on_points(&cells, &body.reference, &sheet, Some(&factor));
+    let weights = weights.map_err(|error| error.to_string())?;
     let end = f64::from(columns - 1);
     let mut flock = Flock::new(
         Rule { mean: Mean::Material { rotation: Rotation::Small }, ..Rule::BARYCENTRE },
@@ -137,24 +142,17 @@ pub fn contrast(solver: Solver, contrast: f64) -> Outcome {
     flock.keep_rest();
     let follows: Vec<bool> = body.reference.iter().map(|[x, _]| x > 0.0 && x < end).collect();
     let held: Vectors = body.reference.iter().map(|[x, _]| [if x == end { 1.0 } else { 0.0 }, 0.0]).collect();
-    let system = match system(&flock, &body, follows, held, &[]) {
-        Ok(system) => system,
-        Err(error) => return Outcome::Refused { message: error.to_string() },
-    };
+    let system = system(&flock, &body, follows, held, &[]).map_err(|error| error.to_string())?;
     let request = Request {
         solver: Choice::This(solver),
         tolerance: 1e-8,
         most_iterations: 20_000,
         ..Request::default()
     };
-    let solved = match solve(&system, &request) {
-        Ok(solved) => solved,
-        Err(error) => return Outcome::Refused { message: error.to_string() },
-    };
+    let solved = solve(&system, &request).map_err(|error| error.to_string())?;
     if !solved.is_at_rest() {
         let left = solved.residuals.last().copied().unwrap_or(f64::NAN);
-        let message = format!("{solver} ended short of its tolerance, {left:.1e} of the load being left");
-        return Outcome::Refused { message };
+        return Err(format!("{solver} ended short of its tolerance, {left:.1e} of the load being left"));
     }
     let compliance =
         |columns: std::ops::Range<u32>| columns.map(|c| 1.0 / stiffness(f64::from(c))).sum::<f64>();
@@ -163,8 +161,7 @@ pub fn contrast(solver: Solver, contrast: f64) -> Outcome {
         let expected = compliance(0..body.reference.x[i] as u32) / whole;
         distance(solved.displacement.get(i), [expected, 0.0])
     };
-    let error = worst((0..body.count()).map(off));
-    Outcome::judged(error, 1e-3, "each part stretches by its compliance, over the pull")
+    Ok(worst((0..body.count()).map(off)))
 }
 
 const STRIP: &str = r#"body={shape={kind="grid",columns=1001,rows=2}}"#;

@@ -105,6 +105,7 @@ impl Case {
 }
 
 const THE_SCENE: &str = "the scene";
+const OWN: &str = "a small body of its own";
 
 /// Runs all extremes: of the scene where it has them, otherwise of small bodies made for the purpose.
 pub fn run(load: Load<'_>, scene: &Scene, progress: &mut dyn FnMut(&str)) -> Vec<Case> {
@@ -234,8 +235,8 @@ const SHEET: &str = r#"material={kind="isotropic",young=1000.0,poisson=0.3}"#;
 const MATERIAL: &str = r#"rule.mean={kind="material"}"#;
 const AT_REST: &str = "equilibrium={solver=\"auto\",tolerance=1e-11}";
 
-fn small(overrides: &[&str]) -> Result<Scene, SceneError> {
-    let overrides: Vec<String> = overrides.iter().map(|&text| text.to_owned()).collect();
+fn small(overrides: &[impl ToString]) -> Result<Scene, SceneError> {
+    let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
     Scene::parse("small-body", "the small body of flockform stability", SMALL, &overrides, None)
 }
 

@@ -1,9 +1,7 @@
 //! Loads, stiffnesses and lengths that squares or single precision cannot hold.
 
-use super::{Case, End, MATERIAL, Outcome, small};
+use super::{Case, End, MATERIAL, OWN, Outcome, small};
 use crate::scene::SceneError;
-
-const OWN: &str = "a small body of its own";
 
 /// A cantilever in numbers of its own.
 #[derive(Clone, Copy)]
@@ -66,6 +64,5 @@ fn rest(numbers: Numbers, precision: &str, solver: &str) -> Result<End, SceneErr
         format!("equilibrium={{solver=\"{solver}\",tolerance={tolerance:e},precision=\"{precision}\"}}"),
         MATERIAL.to_owned(),
     ];
-    let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
     End::of(&small(&overrides)?)
 }
