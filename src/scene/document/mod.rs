@@ -108,14 +108,8 @@ impl Document {
         let parsed = DeTable::parse(text).map_err(|error| syntax_problem(file, text, &error))?;
         let lines = Lines::of(text);
         let content = table(parsed.into_inner(), &|offset| Origin::Line(lines.line_of(offset)), 0);
-        let mut root = Node { origin: Origin::File, content };
-        let mut refused = SceneError::default();
-        for (index, text) in overrides.iter().enumerate() {
-            if let Err(problem) = overrides::apply(&mut root, text, Origin::Override(index)) {
-                refused.push(*problem);
-            }
-        }
-        refused.into_result(Document { file: file.to_owned(), overrides: overrides.to_vec(), root })
+        let root = Node { origin: Origin::File, content };
+        Document { file: file.to_owned(), overrides: Vec::new(), root }.overridden(overrides)
     }
 
     /// The document with more overrides after its own.
@@ -123,16 +117,19 @@ impl Document {
     /// # Errors
     /// Every override that is malformed or cannot be placed.
     pub(crate) fn with(&self, more: &[String]) -> Result<Document, SceneError> {
-        let mut document = self.clone();
+        self.clone().overridden(more)
+    }
+
+    fn overridden(mut self, more: &[String]) -> Result<Document, SceneError> {
         let mut refused = SceneError::default();
         for text in more {
-            let origin = Origin::Override(document.overrides.len());
-            document.overrides.push(text.clone());
-            if let Err(problem) = overrides::apply(&mut document.root, text, origin) {
+            let origin = Origin::Override(self.overrides.len());
+            self.overrides.push(text.clone());
+            if let Err(problem) = overrides::apply(&mut self.root, text, origin) {
                 refused.push(*problem);
             }
         }
-        refused.into_result(document)
+        refused.into_result(self)
     }
 
     /// The document as a value that fits `schema`, which is a JSON Schema as schemars derives it.

@@ -43,22 +43,16 @@ impl Scene {
         overrides: &[String],
         folder: Option<&Path>,
     ) -> Result<Self, SceneError> {
-        let document = Document::parse(file, text, overrides)?;
-        let raw = document.read(&schema())?;
-        validate(name, raw, document, folder)
+        build(name, Document::parse(file, text, overrides)?, folder)
     }
-}
 
-impl Scene {
     /// The scene with more keys set after those that it was read with, from the text that was read then. Files are
     /// looked up in `folder`.
     ///
     /// # Errors
     /// Keys that cannot be set so.
     pub fn with(&self, set: &[String], folder: Option<&Path>) -> Result<Self, SceneError> {
-        let document = self.document.with(set)?;
-        let raw = document.read(&schema())?;
-        validate(&self.name, raw, document, folder)
+        build(&self.name, self.document.with(set)?, folder)
     }
 
     /// The scene without what puts its body to rest at once: a body to be stepped. Files are looked up in `folder`.
@@ -72,6 +66,11 @@ impl Scene {
         }
         validate(&self.name, raw, self.document.clone(), folder)
     }
+}
+
+fn build(name: &str, document: Document, folder: Option<&Path>) -> Result<Scene, SceneError> {
+    let raw = document.read(&schema())?;
+    validate(name, raw, document, folder)
 }
 
 /// The JSON Schema of a scene file.
