@@ -99,7 +99,10 @@ impl Document {
                 Ok(Err(panic)) => std::panic::resume_unwind(panic),
                 // No threads on this platform at all.
                 Err(error) if error.kind() == ErrorKind::Unsupported => parse(),
-                Err(error) => Err(unread_problem(file, &error).into()),
+                Err(error) => {
+                    let message = format!("cannot be parsed, since no thread can be started: {error}");
+                    Err(Problem::of_file(file, message, None).into())
+                }
             }
         })
     }
@@ -293,29 +296,15 @@ fn fits_64_bits(value: i128) -> bool {
 fn syntax_problem(file: &str, text: &str, error: &Error) -> Problem {
     let line = error.span().map(|span| Lines::of(text).line_of(span.start));
     let reads = line.and_then(|line| text.lines().nth(line - 1)).map(str::trim);
-    Problem {
-        place: match line {
-            Some(line) => Place::Line { file: file.to_owned(), line },
-            None => Place::File { file: file.to_owned() },
-        },
-        key: String::new(),
-        found: None,
-        message: format!("not valid TOML: {}", error.message()),
-        help: reads.filter(|reads| !reads.is_empty()).map(|reads| {
-            let shown: String = reads.chars().take(SHOWN_CHARACTERS).collect();
-            format!("the line reads `{shown}`")
-        }),
+    let help = reads.filter(|reads| !reads.is_empty()).map(|reads| {
+        let shown: String = reads.chars().take(SHOWN_CHARACTERS).collect();
+        format!("the line reads `{shown}`")
+    });
+    let mut problem = Problem::of_file(file, format!("not valid TOML: {}", error.message()), help);
+    if let Some(line) = line {
+        problem.place = Place::Line { file: file.to_owned(), line };
     }
-}
-
-fn unread_problem(file: &str, error: &std::io::Error) -> Problem {
-    Problem {
-        place: Place::File { file: file.to_owned() },
-        key: String::new(),
-        found: None,
-        message: format!("cannot be parsed, since no thread can be started: {error}"),
-        help: None,
-    }
+    problem
 }
 
 /// The offsets at which lines end, to turn byte offsets into line numbers.

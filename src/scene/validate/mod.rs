@@ -12,7 +12,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::document::Document;
-use super::document::problem::{Place, Problem, SceneError};
+use super::document::problem::{Problem, SceneError};
 use super::raw::*;
 use super::{BodySource, Fracture, PoissonTerm, Record, Scene, Stop, Weights, text};
 use crate::flock::body::Cut;
@@ -95,13 +95,10 @@ impl File {
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         match text::read(path) {
             Ok(text) => Ok(Self { name, file, text }),
-            Err(error) => Err(SceneError::from(Problem {
-                place: Place::File { file },
-                key: String::new(),
-                found: None,
-                message: format!("cannot be read: {error}"),
-                help: Some(help.to_owned()),
-            })),
+            Err(error) => {
+                let message = format!("cannot be read: {error}");
+                Err(Problem::of_file(&file, message, Some(help.to_owned())).into())
+            }
         }
     }
 }
