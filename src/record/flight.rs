@@ -1,6 +1,7 @@
 //! The messages that the node of a simulated flight would receive and send.
 
 use super::RecordError;
+use super::topics::single_topics;
 use crate::messages::builtin_interfaces::Time;
 use crate::messages::flockform_msgs::LoopEvent;
 use crate::messages::formation::diagnostics::{self, Statistics};
@@ -11,7 +12,7 @@ use crate::messages::nav_msgs::Odometry;
 use crate::messages::recorder::{MessageRecorder, RecordSink};
 use crate::messages::std_msgs::Header;
 use crate::scene::swarm::Swarm;
-use crate::scene::swarm::raw::{RawNode, RawPoseType};
+use crate::scene::swarm::raw::RawPoseType;
 use crate::swarm::control::Control;
 use crate::swarm::transport::Received;
 use crate::swarm::watch::{Pose, Range};
@@ -49,15 +50,7 @@ impl FlightMessages {
     pub fn new(swarm: &Swarm, control: &Control, sink: RecordSink) -> Result<Self, RecordError> {
         let names = Names::new(NAME, "/", &[])?;
         let raw = &swarm.raw.node;
-        let pattern = match raw.pose_type {
-            // One message for all would say of all what the channels have delivered of one.
-            RawPoseType::PoseArray => RawNode::default().pose_topic,
-            _ => raw.pose_topic.clone(),
-        };
-        let targets = match raw.has_target_array() {
-            true => RawNode::default().target_topic,
-            false => raw.target_topic.clone(),
-        };
+        let [poses, targets] = single_topics(raw);
         let of_robots = |pattern: &str| -> Result<Vec<String>, NameError> {
             let all = control.formation().names.iter();
             all.map(|name| names.fleet_topic(&pattern.replace("{name}", name))).collect()
@@ -65,7 +58,7 @@ impl FlightMessages {
         Ok(Self {
             recorder: MessageRecorder::new(&names, &raw.frame_id, sink)?,
             topics: Topics {
-                poses: of_robots(&pattern)?,
+                poses: of_robots(&poses)?,
                 ranges: of_robots(&raw.ranges_topic)?,
                 targets: of_robots(&targets)?,
                 state: names.topic("~/state")?,
