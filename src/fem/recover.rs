@@ -23,7 +23,7 @@ impl Solution {
         let mesh = self.mesh();
         let samples = self.samples();
         let (starts, cells) = mesh.cells_of_nodes();
-        let around = |node: usize| &cells[starts[node]..starts[node + 1]];
+        let around = |node: usize| &cells[starts[node] as usize..starts[node + 1] as usize];
         let mut sums = vec![([0.0; 4], 0.0); mesh.node_count()];
         let corners = corner_nodes(mesh);
         for vertex in (0..mesh.node_count()).filter(|&n| corners[n]) {

@@ -16,6 +16,7 @@ use crate::flock::vectors::Vectors;
 use super::boundary::{Boundary, ways};
 use super::elastic::Elastic;
 use super::stiffness::{ShapeError, centroid, cut_load_shares, element_of, load_shares, mean_strain};
+use crate::geometry::lists::lists_of;
 use crate::geometry::outline::{Outline, OutlineError};
 
 /// Cells of any polygons, in compressed form. Corners run counter-clockwise.
@@ -239,21 +240,9 @@ impl Cells {
 
     /// Which cells each of `particles` particles is a corner of.
     pub fn incidence(&self, particles: usize) -> Incidence {
-        let mut starts = vec![0u32; particles + 1];
-        for &i in &self.index {
-            starts[i as usize + 1] += 1;
-        }
-        for i in 0..particles {
-            starts[i + 1] += starts[i];
-        }
-        let mut next = starts.clone();
-        let mut cell = vec![0; self.index.len()];
-        for (number, corners) in self.iter().enumerate() {
-            for &i in corners {
-                cell[next[i as usize] as usize] = number as u32;
-                next[i as usize] += 1;
-            }
-        }
+        let corners =
+            || (0..).zip(self.iter()).flat_map(|(cell, corners)| corners.iter().map(move |&i| (i, cell)));
+        let (starts, cell) = lists_of(particles, corners);
         Incidence { starts, cell }
     }
 
