@@ -1,4 +1,4 @@
-//! Lists of indices in compressed form: one after the other, with the places where they begin.
+//! Lists of indices: sorted, around a polygon, or many of them one after the other.
 
 /// Sorts members into so many lists, each in the order in which `pairs` has its members: where each list begins, shape
 /// \[count + 1\], and the members of all. `pairs` gives each member after its list, the same each time.
@@ -17,4 +17,17 @@ pub(crate) fn lists_of<I: Iterator<Item = (u32, u32)>>(
         next[list as usize] += 1;
     }
     (starts, members)
+}
+
+/// Each of these once, ascending.
+pub(crate) fn distinct<T: Ord>(of: impl IntoIterator<Item = T>) -> Vec<T> {
+    let mut all: Vec<T> = of.into_iter().collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// The sides of a polygon: each corner and the next.
+pub(crate) fn ways<T: Copy>(corners: &[T]) -> impl Iterator<Item = [T; 2]> {
+    (0..corners.len()).map(|k| [corners[k], corners[(k + 1) % corners.len()]])
 }

@@ -16,7 +16,7 @@ use crate::flock::vectors::Vectors;
 use super::boundary::{Boundary, ways};
 use super::elastic::Elastic;
 use super::stiffness::{ShapeError, centroid, cut_load_shares, element_of, load_shares, mean_strain};
-use crate::geometry::lists::lists_of;
+use crate::geometry::lists::{self, distinct, lists_of};
 use crate::geometry::outline::{Outline, OutlineError};
 
 /// Cells of any polygons, in compressed form. Corners run counter-clockwise.
@@ -255,12 +255,8 @@ impl Cells {
         }
         Neighbours::from_lists((0..particles).map(|i| {
             let near = cell_neighbours.of(i);
-            let mut all: Vec<u32> =
-                near.iter().flat_map(|&j| cell_neighbours.of(j as usize)).chain(near).copied().collect();
-            all.sort_unstable();
-            all.dedup();
-            all.retain(|&j| j as usize != i);
-            all
+            let all = near.iter().flat_map(|&j| cell_neighbours.of(j as usize)).chain(near).copied();
+            distinct(all.filter(|&j| j as usize != i))
         }))
     }
 
@@ -270,11 +266,7 @@ impl Cells {
         let incidence = self.incidence(particles);
         Neighbours::from_lists((0..particles).map(|i| {
             let cells = incidence.of(i).iter();
-            let mut cell_neighbours: Vec<u32> = cells.flat_map(|&c| self.of(c as usize)).copied().collect();
-            cell_neighbours.sort_unstable();
-            cell_neighbours.dedup();
-            cell_neighbours.retain(|&mate| mate as usize != i);
-            cell_neighbours
+            distinct(cells.flat_map(|&c| self.of(c as usize)).copied().filter(|&mate| mate as usize != i))
         }))
     }
 
@@ -286,8 +278,7 @@ impl Cells {
 
     /// Sides of a cell, counter-clockwise.
     pub fn sides(&self, cell: usize) -> impl Iterator<Item = [u32; 2]> {
-        let corners = self.of(cell);
-        (0..corners.len()).map(|k| [corners[k], corners[(k + 1) % corners.len()]])
+        lists::ways(self.of(cell))
     }
 
     /// Sides that belong to one cell only, the body to the left of each, in the order of cells.

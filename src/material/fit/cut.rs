@@ -14,6 +14,7 @@ use super::sites::{NearSite, Sites, State};
 use super::{FitError, ROUNDING, Scale, is_kept_corner, order};
 use crate::flock::lattice::{Lattice, Site};
 use crate::flock::vectors::distance;
+use crate::geometry::lists::{distinct, ways};
 use crate::geometry::locate::Finder;
 use crate::geometry::meeting::meetings;
 use crate::geometry::outline::Place;
@@ -126,11 +127,9 @@ impl<'a> Cutter<'a> {
                 cells.extend(template.iter().map(|corner| ([i - corner[0], j - corner[1]], kind as u32)));
             }
         }
-        cells.sort_unstable();
-        cells.dedup();
         let is_base = |site: Site| self.lattice.is_site(site) && self.lattice.sublattice(site) == 0;
         cells.retain(|&(site, _)| is_base(site));
-        for (site, kind) in cells {
+        for (site, kind) in distinct(cells) {
             let template = &self.scale.templates[kind as usize];
             let corners: Vec<Site> =
                 template.iter().map(|corner| [site[0] + corner[0], site[1] + corner[1]]).collect();
@@ -140,10 +139,10 @@ impl<'a> Cutter<'a> {
             }
             let number = self.candidates.len() as u32;
             self.known.insert((site, kind), number);
-            for (k, &corner) in corners.iter().enumerate() {
+            for [corner, next] in ways(&corners) {
                 let node = self.node_of(corner);
                 self.cells_of[node as usize].push(number);
-                let key = side_key(corner, corners[(k + 1) % corners.len()]);
+                let key = side_key(corner, next);
                 self.beside.entry(key).or_default().push(number);
             }
             let [chords, lines] = [Vec::new(), Vec::new()];
@@ -286,8 +285,7 @@ impl<'a> Cutter<'a> {
             let corners = &self.candidates[*cell as usize].corners;
             let mut least = f64::INFINITY;
             let mut beside = None;
-            for (k, &corner) in corners.iter().enumerate() {
-                let next = corners[(k + 1) % corners.len()];
+            for [corner, next] in ways(corners) {
                 let [a, b] = [corner, next].map(|site| self.nodes[self.node_of(site) as usize].point);
                 let length = distance(a, b);
                 let left = ((b[0] - a[0]) * (point[1] - a[1]) - (b[1] - a[1]) * (point[0] - a[0])) / length;
@@ -386,9 +384,9 @@ impl<'a> Cutter<'a> {
     fn boundary(&self, cell: u32) -> Vec<u32> {
         let corners = &self.candidates[cell as usize].corners;
         let mut nodes = Vec::with_capacity(2 * corners.len());
-        for (k, &corner) in corners.iter().enumerate() {
+        for [corner, next] in ways(corners) {
             nodes.push(self.node_of(corner));
-            let key = side_key(corner, corners[(k + 1) % corners.len()]);
+            let key = side_key(corner, next);
             if let Some(cuts) = self.cuts.get(&key) {
                 let on_side = cuts.iter().map(|&(_, node)| node);
                 if key[0] == corner { nodes.extend(on_side) } else { nodes.extend(on_side.rev()) }
@@ -476,8 +474,7 @@ impl<'a> Cutter<'a> {
     /// Whether a part of a cell is inside: what the outline says whose chords bound it, or its lattice points.
     fn is_inside(&self, candidate: &Candidate, part: &[u32]) -> Result<bool, FitError> {
         let mut verdicts = [false; 2];
-        for k in 0..part.len() {
-            let way = [part[k], part[(k + 1) % part.len()]];
+        for way in ways(part) {
             let back = [way[1], way[0]];
             if candidate.chords.contains(&way) {
                 verdicts[1] = true;

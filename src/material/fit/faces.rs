@@ -3,6 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use crate::flock::lattice::Site;
+use crate::geometry::lists::ways;
 use crate::geometry::outline::Place;
 use crate::geometry::partition::Partition;
 use crate::geometry::point::area;
@@ -105,9 +106,4 @@ impl Faces {
             }
         }
     }
-}
-
-/// Sides of a face.
-pub fn ways(face: &[u32]) -> impl Iterator<Item = [u32; 2]> + '_ {
-    (0..face.len()).map(|k| [face[k], face[(k + 1) % face.len()]])
 }

@@ -2,9 +2,10 @@
 
 use std::collections::HashMap;
 
-use super::faces::{Face, Faces, ways};
+use super::faces::{Face, Faces};
 use super::{LEAST_AREA, LEAST_SIDE, LEAST_WIDTH, ROUNDING, Scale};
 use crate::flock::vectors::distance;
+use crate::geometry::lists::{distinct, ways};
 use crate::geometry::point;
 
 /// One makes work for the other: after a few rounds nothing is left to do.
@@ -90,10 +91,8 @@ fn merge(faces: &mut Faces, scale: &Scale) -> usize {
         if corners.is_empty() || is_fine(faces, corners) {
             continue;
         }
-        let mut beside: Vec<usize> = ways(corners).filter_map(|[a, b]| owner.get(&[b, a]).copied()).collect();
-        beside.sort_unstable();
-        beside.dedup();
-        beside.retain(|&other| faces.faces[other].region == *region);
+        let beside = ways(corners).filter_map(|[a, b]| owner.get(&[b, a]).copied());
+        let beside = distinct(beside.filter(|&other| faces.faces[other].region == *region));
         let joined = beside.into_iter().filter_map(|other| {
             let joined = join(corners, &faces.faces[other].corners)?;
             is_simple(faces, &joined).then(|| (compactness(faces, &joined), other, joined))
