@@ -62,6 +62,12 @@ impl Faces {
         self.still_whole.get(&(site, kind as u32)).copied()
     }
 
+    /// The face that has each side, the way it runs there.
+    pub fn owners(&self) -> HashMap<[u32; 2], usize> {
+        let faces = self.faces.iter().enumerate();
+        faces.flat_map(|(number, face)| ways(&face.corners).map(move |way| (way, number))).collect()
+    }
+
     /// To be called when the faces are final.
     pub fn note_whole(&mut self) {
         let whole = self.cells().filter_map(|face| Some((face.whole?, face.region)));
@@ -74,12 +80,7 @@ impl Faces {
         if outline.regions().is_empty() {
             return;
         }
-        let mut owner: HashMap<[u32; 2], usize> = HashMap::new();
-        for (number, face) in self.faces.iter().enumerate() {
-            ways(&face.corners).for_each(|way| {
-                owner.insert(way, number);
-            });
-        }
+        let owner = self.owners();
         let mut seen = vec![false; self.faces.len()];
         for first in 0..self.faces.len() {
             let mut group = Vec::new();

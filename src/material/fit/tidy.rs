@@ -68,12 +68,7 @@ fn compactness(faces: &Faces, corners: &[u32]) -> f64 {
 /// other at next to no cost.
 fn merge(faces: &mut Faces, scale: &Scale) -> usize {
     let (least, narrow) = (LEAST_AREA * scale.area, LEAST_WIDTH * scale.altitude);
-    let mut owner: HashMap<[u32; 2], usize> = HashMap::new();
-    for (number, face) in faces.faces.iter().enumerate() {
-        ways(&face.corners).for_each(|way| {
-            owner.insert(way, number);
-        });
-    }
+    let mut owner = faces.owners();
     let is_fine = |faces: &Faces, corners: &[u32]| {
         area(faces, corners) >= least && width(faces, corners) >= narrow && !is_dart(faces, corners)
     };
@@ -103,9 +98,7 @@ fn merge(faces: &mut Faces, scale: &Scale) -> usize {
                     owner.remove(&way);
                 });
             }
-            ways(&joined).for_each(|way| {
-                owner.insert(way, other);
-            });
+            owner.extend(ways(&joined).map(|way| (way, other)));
             faces.faces[face].corners.clear();
             let region = faces.faces[other].region;
             faces.faces[other] = Face { corners: joined, whole: None, region };
