@@ -19,6 +19,7 @@ use crate::geometry::locate::Finder;
 use crate::geometry::meeting::meetings;
 use crate::geometry::outline::Place;
 use crate::geometry::partition::Partition;
+use crate::geometry::point::plus;
 
 /// Cuts the cells near the outline.
 ///
@@ -223,11 +224,7 @@ impl<'a> Cutter<'a> {
                     cells.dedup();
                     node
                 }
-                None => {
-                    let node = self.add_corner(corner, beside);
-                    self.corners.insert(corner, node);
-                    node
-                }
+                None => self.add_corner(corner, beside),
             },
         };
         let cuts = self.cuts.entry(key).or_default();
@@ -238,7 +235,9 @@ impl<'a> Cutter<'a> {
     fn add_corner(&mut self, [ring, piece]: [usize; 2], cells: Vec<u32>) -> u32 {
         let place = Place { ring, piece, t: 0.0 };
         let point = self.outline.point(place);
-        self.add_node(Node { point, place: Some(place), is_corner: true, site: None }, cells)
+        let node = self.add_node(Node { point, place: Some(place), is_corner: true, site: None }, cells);
+        self.corners.insert([ring, piece], node);
+        node
     }
 
     /// Corners that are neither lattice points nor on a side yet: inside of cells, or so near a side that they
@@ -262,8 +261,7 @@ impl<'a> Cutter<'a> {
             }
             if !self.corners.contains_key(&key) {
                 let cell = inside.ok_or(self.detail(point))?;
-                let node = self.add_corner(key, vec![cell]);
-                self.corners.insert(key, node);
+                self.add_corner(key, vec![cell]);
             }
         }
         Ok(())
@@ -498,10 +496,7 @@ impl<'a> Cutter<'a> {
                 _ => {}
             }
         }
-        let sum = part.iter().fold([0.0; 2], |[x, y], &node| {
-            let p = self.nodes[node as usize].point;
-            [x + p[0], y + p[1]]
-        });
+        let sum = part.iter().fold([0.0; 2], |sum, &node| plus(sum, self.nodes[node as usize].point));
         let finder = self.finder.get_or_init(|| Finder::new(self.outline.outline()));
         Ok(finder.contains(sum.map(|v| v / part.len() as f64)))
     }
