@@ -108,29 +108,17 @@ impl Value {
     }
 }
 
-impl From<bool> for Value {
-    fn from(value: bool) -> Self {
-        Value::Bool(value)
-    }
+macro_rules! from {
+    ($($content:ty => $kind:ident),+) => {$(
+        impl From<$content> for Value {
+            fn from(value: $content) -> Self {
+                Value::$kind(value.into())
+            }
+        }
+    )+};
 }
 
-impl From<i64> for Value {
-    fn from(value: i64) -> Self {
-        Value::Integer(value)
-    }
-}
-
-impl From<f64> for Value {
-    fn from(value: f64) -> Self {
-        Value::Double(value)
-    }
-}
-
-impl From<&str> for Value {
-    fn from(value: &str) -> Self {
-        Value::String(value.into())
-    }
-}
+from!(bool => Bool, i64 => Integer, f64 => Double, &str => String);
 
 #[cfg(test)]
 mod tests {
