@@ -5,8 +5,9 @@ use super::topics::single_topics;
 use crate::messages::builtin_interfaces::Time;
 use crate::messages::flockform_msgs::LoopEvent;
 use crate::messages::formation::diagnostics::{self, Statistics};
+use crate::messages::formation::pose::said;
 use crate::messages::formation::{NAME, markers, ranges, state, target};
-use crate::messages::geometry_msgs::{self, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped};
+use crate::messages::geometry_msgs::{PoseStamped, PoseWithCovarianceStamped};
 use crate::messages::names::{NameError, Names};
 use crate::messages::nav_msgs::Odometry;
 use crate::messages::recorder::{MessageRecorder, RecordSink};
@@ -122,24 +123,18 @@ impl FlightMessages {
 
     fn pose(&mut self, member: usize, pose: &Pose, now: f64) {
         let raw = &self.swarm.raw.node;
-        let frame_id = if pose.frame_is_right { raw.frame_id.clone() } else { "elsewhere".into() };
-        let header = Header { stamp: Time::from_seconds(pose.stamp), frame_id };
-        let planar = geometry_msgs::Pose::planar(pose.position, pose.yaw);
-        let uncertain = || PoseWithCovariance { pose: planar, ..PoseWithCovariance::default() };
+        let (header, pose) = said(pose, &raw.frame_id);
         let (recorder, topic, times) = (&mut self.recorder, &self.topics.poses[member], [now; 2]);
         match raw.pose_type {
             RawPoseType::PoseStamped | RawPoseType::PoseArray => {
-                recorder.take_received(topic, &PoseStamped { header, pose: planar }, times);
+                recorder.take_received(topic, &PoseStamped { header, pose }, times);
             }
             RawPoseType::PoseWithCovarianceStamped => {
-                recorder.take_received(
-                    topic,
-                    &PoseWithCovarianceStamped { header, pose: uncertain() },
-                    times,
-                );
+                let message = PoseWithCovarianceStamped { header, pose: pose.into() };
+                recorder.take_received(topic, &message, times);
             }
             RawPoseType::Odometry => {
-                let message = Odometry { header, pose: uncertain(), ..Odometry::default() };
+                let message = Odometry { header, pose: pose.into(), ..Odometry::default() };
                 recorder.take_received(topic, &message, times);
             }
         }
