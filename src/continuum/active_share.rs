@@ -4,6 +4,7 @@ use super::plan::Plan;
 use crate::engine::setup::Setup;
 use crate::engine::several::looks_at_every_step;
 use crate::flock::neighbourhood::Neighbours;
+use crate::geometry::lists::lists_of;
 use crate::sweep::Sweep;
 
 /// Share of the followers' updates that the motion of the leaders can reach within `stop.steps` \[1\]; the others
@@ -61,21 +62,12 @@ fn first_motions(plan: &Plan, steps: usize) -> Vec<usize> {
 fn seen_by(plan: &Plan) -> Neighbours {
     let neighbours = &plan.setup.flock.neighbours;
     let pairs = || {
-        let lists = (0..plan.count()).flat_map(|j| neighbours.of(j).iter().map(move |&k| (j as u32, k)));
+        let lists = (0..plan.count()).flat_map(|j| neighbours.of(j).iter().map(move |&k| (k, j as u32)));
         let points = plan.setup.body.frame.iter().flat_map(|frame| (0..frame.len()).map(move |k| (frame, k)));
         let served = points
-            .flat_map(|(frame, k)| frame.served_by(k).iter().map(move |&served| (frame.points[k], served)));
+            .flat_map(|(frame, k)| frame.served_by(k).iter().map(move |&served| (served, frame.points[k])));
         lists.chain(served)
     };
-    let mut starts = vec![0u32; plan.count() + 1];
-    pairs().for_each(|(_, seen)| starts[seen as usize + 1] += 1);
-    for k in 0..plan.count() {
-        starts[k + 1] += starts[k];
-    }
-    let (mut next, mut index) = (starts.clone(), vec![0; starts[plan.count()] as usize]);
-    for (seer, seen) in pairs() {
-        index[next[seen as usize] as usize] = seer;
-        next[seen as usize] += 1;
-    }
+    let (starts, index) = lists_of(plan.count(), pairs);
     Neighbours { starts, index }
 }

@@ -79,7 +79,8 @@ impl std::fmt::Display for StopReason {
 }
 
 /// A body that ceased to be one.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("diverged at step {step}: particle {particle} {what}; likely cause: {likely_cause}")]
 pub struct Divergence {
     /// Step at which it was seen; the engine holds the state before it.
     pub step: usize,
@@ -89,16 +90,6 @@ pub struct Divergence {
     pub what: String,
     /// The usual cause with such a rule.
     pub likely_cause: String,
-}
-
-impl std::fmt::Display for Divergence {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(
-            f,
-            "diverged at step {}: particle {} {}; likely cause: {}",
-            self.step, self.particle, self.what, self.likely_cause
-        )
-    }
 }
 
 /// How a run ended, with the engine in its last good state.

@@ -76,7 +76,7 @@ fn pattern(mesh: &Mesh, unknown: &[Option<usize>], count: usize) -> (Vec<usize>,
     starts.push(0);
     for node in 0..mesh.node_count() {
         neighbours.clear();
-        for &cell in &cells[cell_starts[node]..cell_starts[node + 1]] {
+        for &cell in &cells[cell_starts[node] as usize..cell_starts[node + 1] as usize] {
             neighbours.extend(mesh.cell(cell as usize).iter().filter(|&&n| n as usize >= node));
         }
         neighbours.sort_unstable();

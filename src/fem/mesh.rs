@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use super::element::{CellKind, MAX_NODES};
 use super::error::FemError;
+use crate::geometry::lists::lists_of;
 
 /// Nodes as parallel arrays and cells as one flat list. Always sound: indices exist, every node is used,
 /// coordinates are finite and every cell has positive area, nodes counter-clockwise.
@@ -179,20 +180,9 @@ impl Mesh {
     }
 
     /// For each node the cells that use it, ascending: list i is `cells[start[i]..start[i + 1]]`.
-    pub(crate) fn cells_of_nodes(&self) -> (Vec<usize>, Vec<u32>) {
-        let mut start = vec![0; self.node_count() + 1];
-        for &node in &self.cells {
-            start[node as usize + 1] += 1;
-        }
-        for i in 0..self.node_count() {
-            start[i + 1] += start[i];
-        }
-        let (mut next, mut list) = (start.clone(), vec![0; self.cells.len()]);
-        for (at, &node) in self.cells.iter().enumerate() {
-            list[next[node as usize]] = (at / self.kind.nodes()) as u32;
-            next[node as usize] += 1;
-        }
-        (start, list)
+    pub(crate) fn cells_of_nodes(&self) -> (Vec<u32>, Vec<u32>) {
+        let cell = |at: usize| (at / self.kind.nodes()) as u32;
+        lists_of(self.node_count(), || self.cells.iter().enumerate().map(|(at, &node)| (node, cell(at))))
     }
 }
 

@@ -114,21 +114,17 @@ impl OutlineMesh {
         vertices: &mut Vec<Point>,
         stretches: &mut HashMap<[u32; 2], Stretch>,
     ) -> u32 {
-        let (ends, stretch) = match self.stretches.get_key_value(&[a, b]) {
-            Some((ends, stretch)) => (*ends, Some(*stretch)),
-            None => match self.stretches.get_key_value(&[b, a]) {
-                Some((ends, stretch)) => (*ends, Some(*stretch)),
-                None => ([a.min(b), a.max(b)], None),
-            },
-        };
+        let along = |ends: [u32; 2]| self.stretches.get_key_value(&ends);
+        let on_curve = along([a, b]).or_else(|| along([b, a]));
+        let ends = on_curve.map_or([a.min(b), a.max(b)], |(ends, _)| *ends);
         let node = vertices.len() as u32;
         let share = match ends.map(|end| self.singular.get(&end)) {
             [Some(grading), None] => first_part(*grading),
             [None, Some(grading)] => 1.0 - first_part(*grading),
             _ => 0.5,
         };
-        match stretch {
-            Some(Stretch { curve, t }) => {
+        match on_curve {
+            Some((_, &Stretch { curve, t })) => {
                 let middle = t[0] + share * (t[1] - t[0]);
                 vertices.push(self.curves[curve].piece.point(middle));
                 stretches.insert([ends[0], node], Stretch { curve, t: [t[0], middle] });

@@ -9,6 +9,7 @@
 use super::material::Stress;
 use super::mesh::Mesh;
 use super::solution::Solution;
+use crate::geometry::lists::distinct;
 
 /// Terms of the quadratic polynomial 1, x, y, x2, xy, y2; the linear one uses the first three.
 const MAX_TERMS: usize = 6;
@@ -23,7 +24,7 @@ impl Solution {
         let mesh = self.mesh();
         let samples = self.samples();
         let (starts, cells) = mesh.cells_of_nodes();
-        let around = |node: usize| &cells[starts[node]..starts[node + 1]];
+        let around = |node: usize| &cells[starts[node] as usize..starts[node + 1] as usize];
         let mut sums = vec![([0.0; 4], 0.0); mesh.node_count()];
         let corners = corner_nodes(mesh);
         for vertex in (0..mesh.node_count()).filter(|&n| corners[n]) {
@@ -65,10 +66,7 @@ fn corner_nodes(mesh: &Mesh) -> Vec<bool> {
 /// The vertex itself and the nodes of its cells that are no corners, ascending.
 fn reached(mesh: &Mesh, vertex: usize, cells: &[u32], corners: &[bool]) -> Vec<usize> {
     let nodes = cells.iter().flat_map(|&c| mesh.cell(c as usize)).map(|&n| n as usize);
-    let mut list: Vec<usize> = nodes.filter(|&n| n == vertex || !corners[n]).collect();
-    list.sort_unstable();
-    list.dedup();
-    list
+    distinct(nodes.filter(|&n| n == vertex || !corners[n]))
 }
 
 /// A fitted polynomial in scaled coordinates (x - x0) / size.
@@ -108,14 +106,8 @@ fn fit_patch<'a>(
         {
             return fit;
         }
-        let mut grown: Vec<u32> = patch
-            .iter()
-            .flat_map(|&c| mesh.cell(c as usize))
-            .flat_map(|&n| around(n as usize))
-            .copied()
-            .collect();
-        grown.sort_unstable();
-        grown.dedup();
+        let nodes = patch.iter().flat_map(|&c| mesh.cell(c as usize));
+        let grown = distinct(nodes.flat_map(|&n| around(n as usize)).copied());
         if grown.len() == patch.len() {
             let fits = [6, 3, 1].into_iter().filter(|&t| t <= wanted);
             return fits

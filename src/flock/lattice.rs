@@ -7,6 +7,8 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use crate::geometry::point::bounds;
+
 /// Integer coordinates of a site: `[column, row]`.
 pub type Site = [i32; 2];
 
@@ -161,6 +163,12 @@ impl Lattice {
         let ([ax, ay], [bx, by]) = (self.e1.map(|v| v / unit), self.e2.map(|v| v / unit));
         let area = ax * by - ay * bx;
         [(dx * by - dy * bx) / area, (dy * ax - dx * ay) / area]
+    }
+
+    /// Lowest and highest grid coordinates of the rectangle between two points \[length\].
+    pub(crate) fn grid_bounds(&self, (low, high): ([f64; 2], [f64; 2])) -> ([f64; 2], [f64; 2]) {
+        let corners = [low, [high[0], low[1]], high, [low[0], high[1]]];
+        bounds(corners.map(|corner| self.grid_coordinates(corner)))
     }
 
     /// Smallest distance between two sites \[length\]: the scale residuals are relative to.

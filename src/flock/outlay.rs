@@ -318,14 +318,8 @@ fn window(lattice: &Lattice, cut: &Cut) -> Result<(Site, Site), BodyError> {
             Ok(([0, 0], [across.saturating_sub(1) as i32, rows.saturating_sub(1) as i32]))
         }
         Cut::Shape(shape) => {
-            let (low, high) = shape.bounds();
-            let corners = [low, [high[0], low[1]], high, [low[0], high[1]]]
-                .map(|corner| lattice.grid_coordinates(corner));
-            let extreme = |k: usize, pick: fn(f64, f64) -> f64, start: f64| {
-                corners.iter().map(|corner| corner[k]).fold(start, pick)
-            };
-            let lows = [0, 1].map(|k| extreme(k, f64::min, f64::INFINITY).floor() - 1.0);
-            let highs = [0, 1].map(|k| extreme(k, f64::max, f64::NEG_INFINITY).ceil() + 1.0);
+            let (low, high) = lattice.grid_bounds(shape.bounds());
+            let (lows, highs) = (low.map(|v| v.floor() - 1.0), high.map(|v| v.ceil() + 1.0));
             let in_range = lows.iter().chain(&highs).all(|v| v.abs() <= FARTHEST_SITE as f64);
             if !in_range {
                 return Err(BodyError::TooLarge { limit: MOST_SITES });

@@ -5,6 +5,7 @@
 pub mod box_tree;
 mod crossings;
 pub(crate) mod disjoint_sets;
+pub(crate) mod lists;
 pub mod locate;
 pub mod meeting;
 pub mod outline;

@@ -95,17 +95,7 @@ pub(super) fn profile(specimen: &Specimen) -> Vec<Piece> {
     right[3].from = right[2].to;
     right[3].to = right[4].from;
     (right[2].begins_at_corner, right[3].begins_at_corner) = (false, false);
-    let mirrored = |piece: &Piece| {
-        let flip = |[x, y]: Point| [-x, y];
-        let arc = piece.arc.map(|arc| Arc {
-            centre: flip(arc.centre),
-            start: TAU / 2.0 - arc.start,
-            sweep: -arc.sweep,
-            ..arc
-        });
-        Piece { from: flip(piece.from), to: flip(piece.to), arc, ..*piece }
-    };
-    let left: Vec<Piece> = right.iter().map(mirrored).collect();
+    let left: Vec<Piece> = right.iter().map(|piece| reflected(piece, |[x, y]| [-x, y], TAU / 2.0)).collect();
     let mut ring = right;
     ring.push(Piece::edge([wide, overall], [-wide, overall]));
     // Down the left side: each piece begins at a corner if the one after it did on the way up.
@@ -118,17 +108,19 @@ pub(super) fn profile(specimen: &Specimen) -> Vec<Piece> {
     if !lying {
         return ring;
     }
-    let swap = |[x, y]: Point| [y, x];
-    let swapped = |piece: &Piece| {
-        let arc = piece.arc.map(|arc| Arc {
-            centre: swap(arc.centre),
-            start: TAU / 4.0 - arc.start,
-            sweep: -arc.sweep,
-            ..arc
-        });
-        Piece { from: swap(piece.from), to: swap(piece.to), arc, ..*piece }
-    };
-    reversed(&ring.iter().map(swapped).collect::<Vec<_>>())
+    let swapped = ring.iter().map(|piece| reflected(piece, |[x, y]| [y, x], TAU / 4.0));
+    reversed(&swapped.collect::<Vec<_>>())
+}
+
+/// The mirror image of a piece, where a place becomes what `flip` makes of it and an angle what it lacks of `whole`.
+fn reflected(piece: &Piece, flip: fn(Point) -> Point, whole: f64) -> Piece {
+    let arc = piece.arc.map(|arc| Arc {
+        centre: flip(arc.centre),
+        start: whole - arc.start,
+        sweep: -arc.sweep,
+        ..arc
+    });
+    Piece { from: flip(piece.from), to: flip(piece.to), arc, ..*piece }
 }
 
 #[cfg(test)]

@@ -16,7 +16,9 @@ use crate::flock::vectors::Vectors;
 use super::boundary::{Boundary, ways};
 use super::elastic::Elastic;
 use super::stiffness::{ShapeError, centroid, cut_load_shares, element_of, load_shares, mean_strain};
+use crate::geometry::lists::{self, distinct, lists_of};
 use crate::geometry::outline::{Outline, OutlineError};
+use crate::geometry::point::plus;
 
 /// Cells of any polygons, in compressed form. Corners run counter-clockwise.
 #[derive(Clone, Debug, PartialEq)]
@@ -239,21 +241,9 @@ impl Cells {
 
     /// Which cells each of `particles` particles is a corner of.
     pub fn incidence(&self, particles: usize) -> Incidence {
-        let mut starts = vec![0u32; particles + 1];
-        for &i in &self.index {
-            starts[i as usize + 1] += 1;
-        }
-        for i in 0..particles {
-            starts[i + 1] += starts[i];
-        }
-        let mut next = starts.clone();
-        let mut cell = vec![0; self.index.len()];
-        for (number, corners) in self.iter().enumerate() {
-            for &i in corners {
-                cell[next[i as usize] as usize] = number as u32;
-                next[i as usize] += 1;
-            }
-        }
+        let corners =
+            || (0..).zip(self.iter()).flat_map(|(cell, corners)| corners.iter().map(move |&i| (i, cell)));
+        let (starts, cell) = lists_of(particles, corners);
         Incidence { starts, cell }
     }
 
@@ -266,12 +256,8 @@ impl Cells {
         }
         Neighbours::from_lists((0..particles).map(|i| {
             let near = cell_neighbours.of(i);
-            let mut all: Vec<u32> =
-                near.iter().flat_map(|&j| cell_neighbours.of(j as usize)).chain(near).copied().collect();
-            all.sort_unstable();
-            all.dedup();
-            all.retain(|&j| j as usize != i);
-            all
+            let all = near.iter().flat_map(|&j| cell_neighbours.of(j as usize)).chain(near).copied();
+            distinct(all.filter(|&j| j as usize != i))
         }))
     }
 
@@ -281,11 +267,7 @@ impl Cells {
         let incidence = self.incidence(particles);
         Neighbours::from_lists((0..particles).map(|i| {
             let cells = incidence.of(i).iter();
-            let mut cell_neighbours: Vec<u32> = cells.flat_map(|&c| self.of(c as usize)).copied().collect();
-            cell_neighbours.sort_unstable();
-            cell_neighbours.dedup();
-            cell_neighbours.retain(|&mate| mate as usize != i);
-            cell_neighbours
+            distinct(cells.flat_map(|&c| self.of(c as usize)).copied().filter(|&mate| mate as usize != i))
         }))
     }
 
@@ -297,8 +279,7 @@ impl Cells {
 
     /// Sides of a cell, counter-clockwise.
     pub fn sides(&self, cell: usize) -> impl Iterator<Item = [u32; 2]> {
-        let corners = self.of(cell);
-        (0..corners.len()).map(|k| [corners[k], corners[(k + 1) % corners.len()]])
+        lists::ways(self.of(cell))
     }
 
     /// Sides that belong to one cell only, the body to the left of each, in the order of cells.
@@ -354,10 +335,7 @@ impl Cells {
     /// Centre of each cell, the mean of its corners \[length\], shape \[count\].
     pub fn centres(&self, reference: &Vectors) -> Vectors {
         let centre = |cell: &[u32]| {
-            let sum = cell.iter().fold([0.0; 2], |[x, y], &i| {
-                let p = reference.get(i as usize);
-                [x + p[0], y + p[1]]
-            });
+            let sum = cell.iter().fold([0.0; 2], |sum, &i| plus(sum, reference.get(i as usize)));
             sum.map(|s| s / cell.len() as f64)
         };
         self.iter().map(centre).collect()

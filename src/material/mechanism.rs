@@ -12,6 +12,7 @@ use super::cells::{Cells, Incidence};
 use crate::flock::vectors::Vectors;
 use crate::geometry::Point;
 use crate::geometry::disjoint_sets::DisjointSets;
+use crate::geometry::lists::distinct;
 
 /// How a body, or what its leaders hold of it, can move without strain. Particles are named by their
 /// ids, which count from 1.
@@ -336,9 +337,7 @@ impl Linkage {
 impl Hinge {
     /// The particle, if the cells around it are of several parts.
     pub fn of((particle, place): (usize, Point), parts: impl Iterator<Item = usize>) -> Option<Self> {
-        let mut parts: Vec<usize> = parts.collect();
-        parts.sort_unstable();
-        parts.dedup();
+        let parts = distinct(parts);
         (parts.len() > 1).then_some(Self { particle, place, parts })
     }
 }
@@ -351,9 +350,7 @@ mod tests {
     /// Unit squares with these lower left corners, and the sites of their particles.
     fn squares(of: &[Site]) -> (Cells, Vectors, Vec<Site>) {
         let corners = |&[i, j]: &Site| [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]];
-        let mut sites: Vec<Site> = of.iter().flat_map(corners).collect();
-        sites.sort_unstable();
-        sites.dedup();
+        let sites = distinct(of.iter().flat_map(corners));
         let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0; 2], 0.0);
         let mut cells = Cells::of_sites(&lattice, &sites, |_| true);
         // Sites around a hole make a cell in the hole too: keep those asked for.

@@ -26,8 +26,14 @@ impl Time {
     /// From seconds since the epoch, to the nearest nanosecond; beyond what 32 bits hold (the year
     /// 2038) the last second they do, and the epoch for what is no number.
     pub fn from_seconds(seconds: f64) -> Self {
-        let (sec, nanosec) = split(seconds);
-        Self { sec, nanosec }
+        let whole = seconds.floor();
+        let nanoseconds = ((seconds - whole) * 1e9).round();
+        // The rounding may have reached the next second. `as` saturates and maps what is no number to 0.
+        if nanoseconds >= 1e9 {
+            Self { sec: (whole + 1.0) as i32, nanosec: 0 }
+        } else {
+            Self { sec: whole as i32, nanosec: nanoseconds as u32 }
+        }
     }
 
     /// Seconds since the epoch; in this century exact to about 2e-7 s.
@@ -39,21 +45,14 @@ impl Time {
 impl Duration {
     /// From seconds, to the nearest nanosecond, as [`Time::from_seconds`].
     pub fn from_seconds(seconds: f64) -> Self {
-        let (sec, nanosec) = split(seconds);
+        let Time { sec, nanosec } = Time::from_seconds(seconds);
         Self { sec, nanosec }
     }
 
     /// Length in seconds.
     pub fn seconds(self) -> f64 {
-        f64::from(self.sec) + f64::from(self.nanosec) * 1e-9
+        Time { sec: self.sec, nanosec: self.nanosec }.seconds()
     }
-}
-
-fn split(seconds: f64) -> (i32, u32) {
-    let whole = seconds.floor();
-    let nanoseconds = ((seconds - whole) * 1e9).round();
-    // The rounding may have reached the next second. `as` saturates and maps what is no number to 0.
-    if nanoseconds >= 1e9 { ((whole + 1.0) as i32, 0) } else { (whole as i32, nanoseconds as u32) }
 }
 
 #[cfg(test)]

@@ -108,7 +108,13 @@ impl Default for Quaternion {
 
 impl Default for PoseWithCovariance {
     fn default() -> Self {
-        Self { pose: Pose::default(), covariance: [0.0; 36] }
+        Pose::default().into()
+    }
+}
+
+impl From<Pose> for PoseWithCovariance {
+    fn from(pose: Pose) -> Self {
+        Self { pose, covariance: [0.0; 36] }
     }
 }
 

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::std_msgs::Empty;
-use super::{Message, service};
+use super::{messages, service};
 
 /// `msg/State`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -37,10 +37,7 @@ pub struct TransitionEvent {
     pub goal_state: State,
 }
 
-impl Message for TransitionEvent {
-    const PACKAGE: &str = "lifecycle_msgs";
-    const NAME: &str = "TransitionEvent";
-}
+messages!("lifecycle_msgs": TransitionEvent);
 
 service!(ChangeState, "lifecycle_msgs", ChangeStateRequest => ChangeStateResponse);
 

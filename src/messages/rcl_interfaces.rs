@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::builtin_interfaces::Time;
-use super::{Message, service};
+use super::{messages, service};
 
 /// `msg/ParameterValue`: the field that `kind` names counts.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -78,11 +78,6 @@ pub struct ParameterEvent {
     pub deleted_parameters: Vec<Parameter>,
 }
 
-impl Message for ParameterEvent {
-    const PACKAGE: &str = "rcl_interfaces";
-    const NAME: &str = "ParameterEvent";
-}
-
 /// `msg/Log`: a line of a node's log.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Log {
@@ -105,10 +100,7 @@ impl Log {
     pub const FATAL: u8 = 50;
 }
 
-impl Message for Log {
-    const PACKAGE: &str = "rcl_interfaces";
-    const NAME: &str = "Log";
-}
+messages!("rcl_interfaces": ParameterEvent, Log);
 
 /// Request of [`GetParameters`], [`GetParameterTypes`] and [`DescribeParameters`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -11,6 +11,7 @@ use crate::messages::builtin_interfaces::Time;
 use crate::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use crate::messages::flockform_msgs::{FormationState, MemberState};
 use crate::messages::formation::NAME;
+use crate::messages::formation::markers::{of_strain, point};
 use crate::messages::geometry_msgs::{Point, Pose, PoseArray, Vector3};
 use crate::messages::names::Names;
 use crate::messages::recorder::{MessageRecorder, RecordSink};
@@ -25,8 +26,6 @@ const FRAMES: usize = 500;
 /// Larger bodies are recorded without what a player could not show of them: members, then bonds.
 const MOST_MEMBERS: usize = 5_000;
 const MOST_BONDS: usize = 200_000;
-/// Strain at which a bond has its full colour \[1\].
-const FULL_STRAIN: f64 = 0.3;
 
 /// Writes down a run, step by step.
 pub struct BodyMessages {
@@ -93,10 +92,6 @@ impl BodyMessages {
     }
 }
 
-fn point([x, y]: [f64; 2]) -> Point {
-    Point { x, y, z: 0.0 }
-}
-
 fn colour(role: Role) -> ColorRGBA {
     let (r, g, b, a) = match role {
         Role::Follower => (0.13, 0.38, 0.75, 1.0),
@@ -127,7 +122,7 @@ fn markers(engine: &Engine, header: &Header) -> MarkerArray {
     MarkerArray { markers: all }
 }
 
-/// Every bond that lives, blue where it is too short, red where it is too long.
+/// Every bond that lives.
 fn bonds(engine: &Engine, header: &Header, width: f64) -> Marker {
     let (present, reference) = (engine.present(), &engine.body().reference);
     let mut marker = Marker {
@@ -143,12 +138,8 @@ fn bonds(engine: &Engine, header: &Header, width: f64) -> Marker {
         for k in flock.live_neighbours(j).filter(once) {
             let rest = distance(reference.get(j), reference.get(k));
             let length = distance(present.get(j), present.get(k));
-            let part = ((length / rest - 1.0) / FULL_STRAIN).clamp(-1.0, 1.0) as f32;
-            let grey = 0.6 * (1.0 - part.abs());
-            let (long, short) = (0.6 + 0.3 * part, 0.6 - 0.3 * part);
-            let (r, b) = if part >= 0.0 { (long, grey) } else { (grey, short) };
             marker.points.extend([point(present.get(j)), point(present.get(k))]);
-            marker.colors.extend([ColorRGBA { r, g: grey, b, a: 0.9 }; 2]);
+            marker.colors.extend([of_strain(length / rest - 1.0); 2]);
         }
     }
     marker

@@ -1,17 +1,19 @@
 //! The messages that the node of a simulated flight would receive and send.
 
 use super::RecordError;
+use super::topics::single_topics;
 use crate::messages::builtin_interfaces::Time;
 use crate::messages::flockform_msgs::LoopEvent;
 use crate::messages::formation::diagnostics::{self, Statistics};
+use crate::messages::formation::pose::said;
 use crate::messages::formation::{NAME, markers, ranges, state, target};
-use crate::messages::geometry_msgs::{self, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped};
+use crate::messages::geometry_msgs::{PoseStamped, PoseWithCovarianceStamped};
 use crate::messages::names::{NameError, Names};
 use crate::messages::nav_msgs::Odometry;
 use crate::messages::recorder::{MessageRecorder, RecordSink};
 use crate::messages::std_msgs::Header;
 use crate::scene::swarm::Swarm;
-use crate::scene::swarm::raw::{RawNode, RawPoseType};
+use crate::scene::swarm::raw::RawPoseType;
 use crate::swarm::control::Control;
 use crate::swarm::transport::Received;
 use crate::swarm::watch::{Pose, Range};
@@ -49,15 +51,7 @@ impl FlightMessages {
     pub fn new(swarm: &Swarm, control: &Control, sink: RecordSink) -> Result<Self, RecordError> {
         let names = Names::new(NAME, "/", &[])?;
         let raw = &swarm.raw.node;
-        let pattern = match raw.pose_type {
-            // One message for all would say of all what the channels have delivered of one.
-            RawPoseType::PoseArray => RawNode::default().pose_topic,
-            _ => raw.pose_topic.clone(),
-        };
-        let targets = match raw.has_target_array() {
-            true => RawNode::default().target_topic,
-            false => raw.target_topic.clone(),
-        };
+        let [poses, targets] = single_topics(raw);
         let of_robots = |pattern: &str| -> Result<Vec<String>, NameError> {
             let all = control.formation().names.iter();
             all.map(|name| names.fleet_topic(&pattern.replace("{name}", name))).collect()
@@ -65,7 +59,7 @@ impl FlightMessages {
         Ok(Self {
             recorder: MessageRecorder::new(&names, &raw.frame_id, sink)?,
             topics: Topics {
-                poses: of_robots(&pattern)?,
+                poses: of_robots(&poses)?,
                 ranges: of_robots(&raw.ranges_topic)?,
                 targets: of_robots(&targets)?,
                 state: names.topic("~/state")?,
@@ -129,24 +123,18 @@ impl FlightMessages {
 
     fn pose(&mut self, member: usize, pose: &Pose, now: f64) {
         let raw = &self.swarm.raw.node;
-        let frame_id = if pose.frame_is_right { raw.frame_id.clone() } else { "elsewhere".into() };
-        let header = Header { stamp: Time::from_seconds(pose.stamp), frame_id };
-        let planar = geometry_msgs::Pose::planar(pose.position, pose.yaw);
-        let uncertain = || PoseWithCovariance { pose: planar, ..PoseWithCovariance::default() };
+        let (header, pose) = said(pose, &raw.frame_id);
         let (recorder, topic, times) = (&mut self.recorder, &self.topics.poses[member], [now; 2]);
         match raw.pose_type {
             RawPoseType::PoseStamped | RawPoseType::PoseArray => {
-                recorder.take_received(topic, &PoseStamped { header, pose: planar }, times);
+                recorder.take_received(topic, &PoseStamped { header, pose }, times);
             }
             RawPoseType::PoseWithCovarianceStamped => {
-                recorder.take_received(
-                    topic,
-                    &PoseWithCovarianceStamped { header, pose: uncertain() },
-                    times,
-                );
+                let message = PoseWithCovarianceStamped { header, pose: pose.into() };
+                recorder.take_received(topic, &message, times);
             }
             RawPoseType::Odometry => {
-                let message = Odometry { header, pose: uncertain(), ..Odometry::default() };
+                let message = Odometry { header, pose: pose.into(), ..Odometry::default() };
                 recorder.take_received(topic, &message, times);
             }
         }

@@ -56,6 +56,15 @@ pub(super) fn topics(
     Ok((topics, has_events))
 }
 
+/// The topics of poses and targets of single robots: where one message for all is sent, those that a node without it has.
+/// It would say of all what the channels of a flight have delivered of one.
+pub(super) fn single_topics(raw: &RawNode) -> [String; 2] {
+    let RawNode { pose_topic, target_topic, .. } = RawNode::default();
+    let poses = if raw.pose_type == RawPoseType::PoseArray { &pose_topic } else { &raw.pose_topic };
+    let targets = if raw.has_target_array() { &target_topic } else { &raw.target_topic };
+    [poses.clone(), targets.clone()]
+}
+
 /// The topics of a swarm's robots and leaders, whether a recording has messages of them or not.
 pub(super) fn of_robots(
     swarm: &Swarm,
@@ -70,16 +79,13 @@ pub(super) fn of_robots(
     if raw.has_target_array() {
         topics.insert(names.fleet_topic(&raw.target_topic)?, Heard::Targets);
     }
-    let default = RawNode::default();
+    let [poses, targets] = single_topics(raw);
     for (m, name) in control.formation().names.iter().enumerate() {
         let of = |pattern: &str| names.fleet_topic(&pattern.replace("{name}", name));
-        let pattern =
-            if raw.pose_type == RawPoseType::PoseArray { &default.pose_topic } else { &raw.pose_topic };
-        let target = if raw.has_target_array() { &default.target_topic } else { &raw.target_topic };
-        topics.insert(of(pattern)?, Heard::Pose(m));
+        topics.insert(of(&poses)?, Heard::Pose(m));
         topics.insert(of(&raw.leader_topic)?, Heard::Leader(m));
         topics.insert(of(&raw.ranges_topic)?, Heard::Ranges(m));
-        topics.insert(of(target)?, Heard::Target(m));
+        topics.insert(of(&targets)?, Heard::Target(m));
     }
     Ok(topics)
 }

@@ -22,10 +22,10 @@ use super::node::{NodeError, TopicOf, settings};
 use crate::messages::Message;
 use crate::messages::builtin_interfaces::Time;
 use crate::messages::flockform_msgs::Ranges;
+use crate::messages::formation::pose::said;
 use crate::messages::formation::ranges;
 use crate::messages::geometry_msgs::{
-    self, PoseArray, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, Quaternion, Transform,
-    TransformStamped, Vector3,
+    self, PoseArray, PoseStamped, PoseWithCovarianceStamped, Quaternion, Transform, TransformStamped, Vector3,
 };
 use crate::messages::nav_msgs::Odometry;
 use crate::messages::rcl_interfaces::Log;
@@ -389,39 +389,27 @@ impl RobotsEnd for Link {
         Ok(())
     }
 
-    fn send(&mut self, now: f64, said: &[(usize, Pose)]) -> Result<(), EdgeError> {
+    fn send(&mut self, now: f64, poses: &[(usize, Pose)]) -> Result<(), EdgeError> {
         let stamp = Time::from_seconds(now);
         if let Some(clock) = &self.clock {
             clock.publish(&Clock { clock: stamp })?;
         }
-        let header = |pose: &Pose| {
-            let frame_id = if pose.frame_is_right { self.frame_id.clone() } else { "elsewhere".into() };
-            Header { stamp: Time::from_seconds(pose.stamp), frame_id }
-        };
-        let planar = |pose: &Pose| geometry_msgs::Pose::planar(pose.position, pose.yaw);
-        for (m, pose) in said {
+        for (m, pose) in poses {
+            let (header, pose) = said(pose, &self.frame_id);
             match &mut self.poses {
-                Poses::Stamped(all) => {
-                    all[*m].publish(&PoseStamped { header: header(pose), pose: planar(pose) })?;
-                }
+                Poses::Stamped(all) => all[*m].publish(&PoseStamped { header, pose })?,
                 Poses::WithCovariance(all) => {
-                    let pose_only = PoseWithCovariance { pose: planar(pose), ..Default::default() };
-                    all[*m].publish(&PoseWithCovarianceStamped { header: header(pose), pose: pose_only })?;
+                    all[*m].publish(&PoseWithCovarianceStamped { header, pose: pose.into() })?;
                 }
                 Poses::Odometry(all) => {
-                    let pose_only = PoseWithCovariance { pose: planar(pose), ..Default::default() };
-                    all[*m].publish(&Odometry {
-                        header: header(pose),
-                        child_frame_id: self.frames[*m].clone(),
-                        pose: pose_only,
-                        ..Odometry::default()
-                    })?;
+                    let (child_frame_id, pose) = (self.frames[*m].clone(), pose.into());
+                    all[*m].publish(&Odometry { header, child_frame_id, pose, ..Odometry::default() })?;
                 }
-                Poses::Array(_, poses) => poses[*m] = planar(pose),
+                Poses::Array(_, poses) => poses[*m] = pose,
             }
         }
-        if let (Poses::Array(topic, poses), Some((_, last))) = (&self.poses, said.last()) {
-            topic.publish(&PoseArray { header: header(last), poses: poses.clone() })?;
+        if let (Poses::Array(topic, all), Some((_, last))) = (&self.poses, poses.last()) {
+            topic.publish(&PoseArray { header: said(last, &self.frame_id).0, poses: all.clone() })?;
         }
         Ok(())
     }

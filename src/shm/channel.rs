@@ -431,14 +431,7 @@ impl<T: Payload> Reader<T> {
 
     /// The newest slice not yet taken; older ones are given back unread.
     pub fn take_last(&self) -> Option<Slice<T>> {
-        let mut last = None;
-        for _ in 0..MOST_AT_ONCE {
-            match self.take() {
-                None => break,
-                newer => last = newer,
-            }
-        }
-        last
+        std::iter::from_fn(|| self.take()).take(MOST_AT_ONCE).last()
     }
 
     /// Sleeps until a slice arrives, for so long at most; whether one may have: the bell still rings for slices that

@@ -181,11 +181,11 @@ fn read_by(matrix: &Matrix, cuts: &Cuts, rank: usize) -> Range<usize> {
 }
 
 /// Both components of single precision go into one word.
-const fn words_per_particle<T>() -> usize {
+pub const fn words_per_particle<T>() -> usize {
     if size_of::<T>() == size_of::<f32>() { 1 } else { 2 }
 }
 
-fn words<T: Real>(v: &Vectors<T>, of: &Range<usize>) -> Vec<u64> {
+pub fn words<T: Real>(v: &Vectors<T>, of: &Range<usize>) -> Vec<u64> {
     let (x, y) = (&v.x[of.clone()], &v.y[of.clone()]);
     if words_per_particle::<T>() == 1 {
         x.iter().zip(y).map(|(x, y)| x.bits() | y.bits() << 32).collect()
@@ -194,7 +194,7 @@ fn words<T: Real>(v: &Vectors<T>, of: &Range<usize>) -> Vec<u64> {
     }
 }
 
-fn put<T: Real>(v: &mut Vectors<T>, of: &Range<usize>, words: &[u64]) {
+pub fn put<T: Real>(v: &mut Vectors<T>, of: &Range<usize>, words: &[u64]) {
     let (x, y) = (&mut v.x[of.clone()], &mut v.y[of.clone()]);
     if words_per_particle::<T>() == 1 {
         for ((x, y), word) in x.iter_mut().zip(y).zip(words) {

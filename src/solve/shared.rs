@@ -7,6 +7,7 @@ use std::ops::Range;
 
 use super::field::Real;
 use super::operator::Columns;
+use super::part::{put, words, words_per_particle};
 use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
 
@@ -116,20 +117,9 @@ pub fn moved<T: Real>(
     let own = exchanged(
         team,
         (owned, wanted),
-        |of| {
-            let of = of.start - first..of.end - first;
-            from.x[of.clone()].iter().chain(&from.y[of]).map(|value| value.bits()).collect()
-        },
-        |count| 2 * count,
-        |of, words| {
-            let (x, y) = words.split_at(of.len());
-            let of = of.start - to_first..of.end - to_first;
-            let put = |to: &mut [T], words: &[u64]| {
-                to.iter_mut().zip(words).for_each(|(value, &bits)| *value = T::of_bits(bits));
-            };
-            put(&mut to.x[of.clone()], x);
-            put(&mut to.y[of], y);
-        },
+        |of| words(from, &(of.start - first..of.end - first)),
+        |count| words_per_particle::<T>() * count,
+        |of, words| put(&mut to, &(of.start - to_first..of.end - to_first), words),
     );
     if !own.is_empty() {
         let (read, write) = (own.start - first..own.end - first, own.start - to_first..own.end - to_first);

@@ -14,10 +14,12 @@ use super::sites::{NearSite, Sites, State};
 use super::{FitError, ROUNDING, Scale, is_kept_corner, order};
 use crate::flock::lattice::{Lattice, Site};
 use crate::flock::vectors::distance;
+use crate::geometry::lists::{distinct, ways};
 use crate::geometry::locate::Finder;
 use crate::geometry::meeting::meetings;
 use crate::geometry::outline::Place;
 use crate::geometry::partition::Partition;
+use crate::geometry::point::plus;
 
 /// Cuts the cells near the outline.
 ///
@@ -126,11 +128,9 @@ impl<'a> Cutter<'a> {
                 cells.extend(template.iter().map(|corner| ([i - corner[0], j - corner[1]], kind as u32)));
             }
         }
-        cells.sort_unstable();
-        cells.dedup();
         let is_base = |site: Site| self.lattice.is_site(site) && self.lattice.sublattice(site) == 0;
         cells.retain(|&(site, _)| is_base(site));
-        for (site, kind) in cells {
+        for (site, kind) in distinct(cells) {
             let template = &self.scale.templates[kind as usize];
             let corners: Vec<Site> =
                 template.iter().map(|corner| [site[0] + corner[0], site[1] + corner[1]]).collect();
@@ -140,10 +140,10 @@ impl<'a> Cutter<'a> {
             }
             let number = self.candidates.len() as u32;
             self.known.insert((site, kind), number);
-            for (k, &corner) in corners.iter().enumerate() {
+            for [corner, next] in ways(&corners) {
                 let node = self.node_of(corner);
                 self.cells_of[node as usize].push(number);
-                let key = side_key(corner, corners[(k + 1) % corners.len()]);
+                let key = side_key(corner, next);
                 self.beside.entry(key).or_default().push(number);
             }
             let [chords, lines] = [Vec::new(), Vec::new()];
@@ -224,11 +224,7 @@ impl<'a> Cutter<'a> {
                     cells.dedup();
                     node
                 }
-                None => {
-                    let node = self.add_corner(corner, beside);
-                    self.corners.insert(corner, node);
-                    node
-                }
+                None => self.add_corner(corner, beside),
             },
         };
         let cuts = self.cuts.entry(key).or_default();
@@ -239,7 +235,9 @@ impl<'a> Cutter<'a> {
     fn add_corner(&mut self, [ring, piece]: [usize; 2], cells: Vec<u32>) -> u32 {
         let place = Place { ring, piece, t: 0.0 };
         let point = self.outline.point(place);
-        self.add_node(Node { point, place: Some(place), is_corner: true, site: None }, cells)
+        let node = self.add_node(Node { point, place: Some(place), is_corner: true, site: None }, cells);
+        self.corners.insert([ring, piece], node);
+        node
     }
 
     /// Corners that are neither lattice points nor on a side yet: inside of cells, or so near a side that they
@@ -263,8 +261,7 @@ impl<'a> Cutter<'a> {
             }
             if !self.corners.contains_key(&key) {
                 let cell = inside.ok_or(self.detail(point))?;
-                let node = self.add_corner(key, vec![cell]);
-                self.corners.insert(key, node);
+                self.add_corner(key, vec![cell]);
             }
         }
         Ok(())
@@ -286,8 +283,7 @@ impl<'a> Cutter<'a> {
             let corners = &self.candidates[*cell as usize].corners;
             let mut least = f64::INFINITY;
             let mut beside = None;
-            for (k, &corner) in corners.iter().enumerate() {
-                let next = corners[(k + 1) % corners.len()];
+            for [corner, next] in ways(corners) {
                 let [a, b] = [corner, next].map(|site| self.nodes[self.node_of(site) as usize].point);
                 let length = distance(a, b);
                 let left = ((b[0] - a[0]) * (point[1] - a[1]) - (b[1] - a[1]) * (point[0] - a[0])) / length;
@@ -386,9 +382,9 @@ impl<'a> Cutter<'a> {
     fn boundary(&self, cell: u32) -> Vec<u32> {
         let corners = &self.candidates[cell as usize].corners;
         let mut nodes = Vec::with_capacity(2 * corners.len());
-        for (k, &corner) in corners.iter().enumerate() {
+        for [corner, next] in ways(corners) {
             nodes.push(self.node_of(corner));
-            let key = side_key(corner, corners[(k + 1) % corners.len()]);
+            let key = side_key(corner, next);
             if let Some(cuts) = self.cuts.get(&key) {
                 let on_side = cuts.iter().map(|&(_, node)| node);
                 if key[0] == corner { nodes.extend(on_side) } else { nodes.extend(on_side.rev()) }
@@ -476,8 +472,7 @@ impl<'a> Cutter<'a> {
     /// Whether a part of a cell is inside: what the outline says whose chords bound it, or its lattice points.
     fn is_inside(&self, candidate: &Candidate, part: &[u32]) -> Result<bool, FitError> {
         let mut verdicts = [false; 2];
-        for k in 0..part.len() {
-            let way = [part[k], part[(k + 1) % part.len()]];
+        for way in ways(part) {
             let back = [way[1], way[0]];
             if candidate.chords.contains(&way) {
                 verdicts[1] = true;
@@ -501,10 +496,7 @@ impl<'a> Cutter<'a> {
                 _ => {}
             }
         }
-        let sum = part.iter().fold([0.0; 2], |[x, y], &node| {
-            let p = self.nodes[node as usize].point;
-            [x + p[0], y + p[1]]
-        });
+        let sum = part.iter().fold([0.0; 2], |sum, &node| plus(sum, self.nodes[node as usize].point));
         let finder = self.finder.get_or_init(|| Finder::new(self.outline.outline()));
         Ok(finder.contains(sum.map(|v| v / part.len() as f64)))
     }

@@ -3,6 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use crate::flock::lattice::Site;
+use crate::geometry::lists::ways;
 use crate::geometry::outline::Place;
 use crate::geometry::partition::Partition;
 use crate::geometry::point::area;
@@ -61,6 +62,12 @@ impl Faces {
         self.still_whole.get(&(site, kind as u32)).copied()
     }
 
+    /// The face that has each side, the way it runs there.
+    pub fn owners(&self) -> HashMap<[u32; 2], usize> {
+        let faces = self.faces.iter().enumerate();
+        faces.flat_map(|(number, face)| ways(&face.corners).map(move |way| (way, number))).collect()
+    }
+
     /// To be called when the faces are final.
     pub fn note_whole(&mut self) {
         let whole = self.cells().filter_map(|face| Some((face.whole?, face.region)));
@@ -73,12 +80,7 @@ impl Faces {
         if outline.regions().is_empty() {
             return;
         }
-        let mut owner: HashMap<[u32; 2], usize> = HashMap::new();
-        for (number, face) in self.faces.iter().enumerate() {
-            ways(&face.corners).for_each(|way| {
-                owner.insert(way, number);
-            });
-        }
+        let owner = self.owners();
         let mut seen = vec![false; self.faces.len()];
         for first in 0..self.faces.len() {
             let mut group = Vec::new();
@@ -105,9 +107,4 @@ impl Faces {
             }
         }
     }
-}
-
-/// Sides of a face.
-pub fn ways(face: &[u32]) -> impl Iterator<Item = [u32; 2]> + '_ {
-    (0..face.len()).map(|k| [face[k], face[(k + 1) % face.len()]])
 }

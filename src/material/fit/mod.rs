@@ -36,6 +36,7 @@ use crate::flock::outlay::{Census, cell_width};
 use crate::flock::part::Extent;
 use crate::flock::vectors::{Vectors, distance};
 use crate::flock::window::Window;
+use crate::geometry::lists::ways;
 use crate::geometry::outline::{Outline, Place};
 use crate::geometry::partition::Partition;
 use crate::geometry::point::area;
@@ -228,10 +229,8 @@ impl Fitted {
         let mut used = vec![false; self.cells.shapes.len()];
         self.cells.kind.iter().for_each(|&kind| used[kind as usize] = true);
         for shape in self.cells.shapes.iter().zip(used).filter_map(|(shape, used)| used.then_some(shape)) {
-            let count = shape.len();
             least.area = least.area.min(area(shape) / scale.area);
-            for k in 0..count {
-                let (a, b) = (shape[k], shape[(k + 1) % count]);
+            for [a, b] in ways(shape) {
                 let length = distance(a, b);
                 let normal = [(b[1] - a[1]) / length, (a[0] - b[0]) / length];
                 let along = shape.iter().map(|p| normal[0] * p[0] + normal[1] * p[1]);

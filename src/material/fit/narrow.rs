@@ -6,6 +6,7 @@ use crate::flock::vectors::distance;
 use crate::geometry::meeting::meetings;
 use crate::geometry::partition::Partition;
 use crate::geometry::piece::Piece;
+use crate::geometry::point::bounds;
 
 /// Looks across the shape, and across its regions, from places half a spacing apart along the outline and the lines inside.
 ///
@@ -14,11 +15,8 @@ use crate::geometry::piece::Piece;
 pub fn require_wide(outline: &Partition, near: &NearPieces, spacing: f64) -> Result<(), FitError> {
     for hole in 1..outline.outline().rings().len() {
         let pieces = outline.ring(hole);
-        let across = |k: usize| {
-            let ends = pieces.iter().map(Piece::bounds).map(|(low, high)| [low[k], high[k]]);
-            ends.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).map_or(0.0, |[low, high]| high - low)
-        };
-        let width = across(0).max(across(1));
+        let (low, high) = bounds(pieces.iter().map(Piece::bounds).flat_map(|(low, high)| [low, high]));
+        let width = (high[0] - low[0]).max(high[1] - low[1]);
         if width < spacing {
             return Err(FitError::SmallHole { hole, width, spacing, place: pieces[0].from });
         }

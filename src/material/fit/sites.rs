@@ -216,13 +216,9 @@ impl Sites {
     }
 
     fn window(lattice: &Lattice, outline: &Outline) -> Result<Window, FitError> {
-        let (low, high) = outline.bounds();
-        let corners =
-            [low, [high[0], low[1]], high, [low[0], high[1]]].map(|corner| lattice.grid_coordinates(corner));
-        let extreme = |k: usize, pick: fn(f64, f64) -> f64| corners.iter().map(|c| c[k]).reduce(pick);
+        let (low, high) = lattice.grid_bounds(outline.bounds());
         // Far enough for the cells around every site near the outline.
-        let lows = [0, 1].map(|k| extreme(k, f64::min).unwrap_or(0.0).floor() - 8.0);
-        let highs = [0, 1].map(|k| extreme(k, f64::max).unwrap_or(0.0).ceil() + 8.0);
+        let (lows, highs) = (low.map(|v| v.floor() - 8.0), high.map(|v| v.ceil() + 8.0));
         if !lows.iter().chain(&highs).all(|v| v.abs() < 1e9) {
             return Err(FitError::TooLarge { limit: MOST_SITES });
         }
@@ -238,19 +234,9 @@ impl Sites {
         let mut bounds: Vec<Bound> = Vec::new();
         for (ring, number, piece) in outline.pieces() {
             for (low, high) in stretches(piece, scale.diameter) {
-                let corners = [
-                    [low[0] - reach, low[1] - reach],
-                    [high[0] + reach, low[1] - reach],
-                    [high[0] + reach, high[1] + reach],
-                    [low[0] - reach, high[1] + reach],
-                ]
-                .map(|corner| lattice.grid_coordinates(corner));
-                let range = |k: usize| {
-                    let values = corners.map(|c| c[k]);
-                    let least = values.into_iter().fold(f64::INFINITY, f64::min).ceil() as i32;
-                    let most = values.into_iter().fold(f64::NEG_INFINITY, f64::max).floor() as i32;
-                    least..=most
-                };
+                let around = (low.map(|v| v - reach), high.map(|v| v + reach));
+                let (least, most) = lattice.grid_bounds(around);
+                let range = |k: usize| least[k].ceil() as i32..=most[k].floor() as i32;
                 for site in range(0).flat_map(|i| range(1).map(move |j| [i, j])) {
                     if !lattice.is_site(site) || self.window.number(site).is_none() {
                         continue;

@@ -2,9 +2,10 @@
 
 use std::collections::HashMap;
 
-use super::faces::{Face, Faces, ways};
+use super::faces::{Face, Faces};
 use super::{LEAST_AREA, LEAST_SIDE, LEAST_WIDTH, ROUNDING, Scale};
 use crate::flock::vectors::distance;
+use crate::geometry::lists::{distinct, ways};
 use crate::geometry::point;
 
 /// One makes work for the other: after a few rounds nothing is left to do.
@@ -75,12 +76,7 @@ fn compactness(faces: &Faces, corners: &[u32]) -> f64 {
 /// other at next to no cost.
 fn merge(faces: &mut Faces, scale: &Scale) -> usize {
     let (least, narrow) = (LEAST_AREA * scale.area, LEAST_WIDTH * scale.altitude);
-    let mut owner: HashMap<[u32; 2], usize> = HashMap::new();
-    for (number, face) in faces.faces.iter().enumerate() {
-        ways(&face.corners).for_each(|way| {
-            owner.insert(way, number);
-        });
-    }
+    let mut owner = faces.owners();
     let is_fine = |faces: &Faces, corners: &[u32]| {
         area(faces, corners) >= least * (1.0 - EQUAL)
             && width(faces, corners) >= narrow * (1.0 - EQUAL)
@@ -100,10 +96,8 @@ fn merge(faces: &mut Faces, scale: &Scale) -> usize {
         if corners.is_empty() || is_fine(faces, corners) {
             continue;
         }
-        let mut beside: Vec<usize> = ways(corners).filter_map(|[a, b]| owner.get(&[b, a]).copied()).collect();
-        beside.sort_unstable();
-        beside.dedup();
-        beside.retain(|&other| faces.faces[other].region == *region);
+        let beside = ways(corners).filter_map(|[a, b]| owner.get(&[b, a]).copied());
+        let beside = distinct(beside.filter(|&other| faces.faces[other].region == *region));
         let joined = beside.into_iter().filter_map(|other| {
             let joined = join(corners, &faces.faces[other].corners)?;
             is_simple(faces, &joined).then(|| (compactness(faces, &joined), other, joined))
@@ -115,9 +109,7 @@ fn merge(faces: &mut Faces, scale: &Scale) -> usize {
                     owner.remove(&way);
                 });
             }
-            ways(&joined).for_each(|way| {
-                owner.insert(way, other);
-            });
+            owner.extend(ways(&joined).map(|way| (way, other)));
             faces.faces[face].corners.clear();
             let region = faces.faces[other].region;
             faces.faces[other] = Face { corners: joined, whole: None, region };

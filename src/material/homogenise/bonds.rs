@@ -2,6 +2,7 @@
 
 use crate::flock::block::{Block, plus};
 use crate::flock::lattice::{Lattice, Site};
+use crate::geometry::lists::distinct;
 use crate::geometry::point::area;
 use crate::material::cells::templates;
 use crate::material::stiffness::mean_gradients;
@@ -26,10 +27,7 @@ fn cells_around(lattice: &Lattice, site: Site) -> Vec<Vec<Site>> {
 
 /// Adds the averaged dilatations to the bonds of a site inside the body: see [`super::dilatation`].
 pub fn add_averaged(lattice: &Lattice, lambda: f64, own: Site, row: &mut Vec<(Site, Block)>) {
-    let mut middles: Vec<Site> = cells_around(lattice, own).concat();
-    middles.sort_unstable();
-    middles.dedup();
-    for middle in middles {
+    for middle in distinct(cells_around(lattice, own).concat()) {
         let (mut total, mut v) = (0.0, Vec::<(Site, [f64; 2])>::new());
         for corners in cells_around(lattice, middle) {
             let shape: Vec<[f64; 2]> = corners.iter().map(|&corner| lattice.vector(corner)).collect();

@@ -52,8 +52,17 @@ fn marker(header: &Header, ns: &str, id: usize, kind: i32) -> Marker {
     }
 }
 
-fn point([x, y]: [f64; 2]) -> Point {
+pub(crate) fn point([x, y]: [f64; 2]) -> Point {
     Point { x, y, z: 0.0 }
+}
+
+/// The colour of a link: blue where it is too short, red where it is too long.
+pub(crate) fn of_strain(strain: f64) -> ColorRGBA {
+    let part = (strain / FULL_STRAIN).clamp(-1.0, 1.0) as f32;
+    let grey = 0.6 * (1.0 - part.abs());
+    let (long, short) = (0.6 + 0.3 * part, 0.6 - 0.3 * part);
+    let (r, b) = if part >= 0.0 { (long, grey) } else { (grey, short) };
+    colour(r, grey, b, 0.9)
 }
 
 fn member(control: &Control, m: usize, header: &Header) -> Option<Marker> {
@@ -73,7 +82,7 @@ fn member(control: &Control, m: usize, header: &Header) -> Option<Marker> {
     })
 }
 
-/// Every link once, blue where it is too short, red where it is too long.
+/// Every link once.
 fn links(control: &Control, header: &Header) -> Marker {
     let formation = control.formation();
     let mut marker = Marker {
@@ -86,13 +95,8 @@ fn links(control: &Control, header: &Header) -> Marker {
         {
             let (Some(a), Some(b)) = (control.position(m), control.position(k)) else { continue };
             let rest = distance(formation.places.get(m), formation.places.get(k));
-            let part = ((distance(a, b) / rest - 1.0) / FULL_STRAIN).clamp(-1.0, 1.0) as f32;
-            let colour = match part {
-                part if part >= 0.0 => colour(0.6 + 0.3 * part, 0.6 * (1.0 - part), 0.6 * (1.0 - part), 0.9),
-                part => colour(0.6 * (1.0 + part), 0.6 * (1.0 + part), 0.6 - 0.3 * part, 0.9),
-            };
             marker.points.extend([point(a), point(b)]);
-            marker.colors.extend([colour, colour]);
+            marker.colors.extend([of_strain(distance(a, b) / rest - 1.0); 2]);
         }
     }
     marker

@@ -1,5 +1,6 @@
 //! Poses of messages as the loop takes them.
 
+use crate::messages::builtin_interfaces::Time;
 use crate::messages::geometry_msgs;
 use crate::messages::std_msgs::Header;
 use crate::swarm::watch::Pose;
@@ -13,6 +14,13 @@ pub fn pose(header: &Header, pose: &geometry_msgs::Pose, arrival: f64, frame_id:
         stamp: if stamped == 0.0 { arrival } else { stamped },
         frame_is_right: is_frame(&header.frame_id, frame_id),
     }
+}
+
+/// How a simulated robot says its pose, in the right frame or in another.
+pub(crate) fn said(pose: &Pose, frame_id: &str) -> (Header, geometry_msgs::Pose) {
+    let frame_id = if pose.frame_is_right { frame_id } else { "elsewhere" };
+    let header = Header { stamp: Time::from_seconds(pose.stamp), frame_id: frame_id.into() };
+    (header, geometry_msgs::Pose::planar(pose.position, pose.yaw))
 }
 
 /// Whether a header speaks of this frame; older tools write a slash before it.

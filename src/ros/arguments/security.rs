@@ -6,7 +6,6 @@
 //! and any other strategy lets it take part in the clear. Unlike there, nothing that asks for security and gets none
 //! passes without a warning, and a file that this node would not honour counts as one that cannot be used.
 
-use std::fmt;
 use std::path::PathBuf;
 
 use super::RosArgumentError;
@@ -39,7 +38,8 @@ pub struct Security {
 }
 
 /// Why the keys of an enclave are not used, or not as their files ask.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{place}: {reason}")]
 pub(super) struct Fault {
     /// File, folder or variable.
     pub place: String,
@@ -58,12 +58,6 @@ pub(super) enum Gravity {
     Dishonoured,
     /// The files are honoured, and protect less than they might.
     Weak,
-}
-
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.place, self.reason)
-    }
 }
 
 impl SecurityRequest {
@@ -156,7 +150,7 @@ impl SecurityRequest {
     }
 }
 
-fn in_the_clear(reason: impl fmt::Display) -> String {
+fn in_the_clear(reason: impl std::fmt::Display) -> String {
     format!("no DDS security: everything is sent and taken in the clear ({reason})")
 }
 

@@ -65,20 +65,18 @@ impl Value {
             let reason = format!("mixes {} and {} in one list", first.type_name(), other.type_name());
             return Err((reason, "give all values one type: [1.0, 2.5], not [1, 2.5]"));
         }
+        // All have the type of the first.
+        macro_rules! list {
+            ($of:ident: $one:ident) => {{
+                let content = |value| if let Self::$one(content) = value { Some(content) } else { None };
+                Self::$of(values.into_iter().filter_map(content).collect())
+            }};
+        }
         Ok(match first {
-            Self::Bool(_) => Self::Bools(collect(values, |value| matches!(value, Self::Bool(true)))),
-            Self::Integer(_) => {
-                Self::Integers(collect(values, |v| if let Self::Integer(number) = v { number } else { 0 }))
-            }
-            Self::Double(_) => {
-                Self::Doubles(collect(
-                    values,
-                    |v| if let Self::Double(number) = v { number } else { f64::NAN },
-                ))
-            }
-            _ => {
-                Self::Texts(collect(values, |v| if let Self::Text(text) = v { text } else { String::new() }))
-            }
+            Self::Bool(_) => list!(Bools: Bool),
+            Self::Integer(_) => list!(Integers: Integer),
+            Self::Double(_) => list!(Doubles: Double),
+            _ => list!(Texts: Text),
         })
     }
 
@@ -95,11 +93,6 @@ impl Value {
             Self::Texts(_) => "string array",
         }
     }
-}
-
-/// The members of a list whose type was checked.
-fn collect<T>(values: Vec<Value>, member: impl Fn(Value) -> T) -> Vec<T> {
-    values.into_iter().map(member).collect()
 }
 
 fn no_value() -> Reason {

@@ -26,19 +26,12 @@ use crate::messages::names::Names;
 use crate::messages::{Message, ServiceType};
 
 /// Where to take part.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Options {
     /// `ROS_DOMAIN_ID`, 0 to 232. Default 0.
     pub domain: u16,
     /// Peers on this computer only. Default false.
     pub loopback_only: bool,
-}
-
-#[expect(clippy::derivable_impls, reason = "defaults stand in one place, each with its meaning")]
-impl Default for Options {
-    fn default() -> Self {
-        Self { domain: 0, loopback_only: false }
-    }
 }
 
 impl fmt::Display for Options {

@@ -26,9 +26,7 @@ impl Payload {
         encode(value, &mut bytes)?;
         Ok(Self { order: Order::Little, bytes })
     }
-}
 
-impl Payload {
     /// As it stands in a packet: behind its encapsulation, and with bytes after it up to a multiple of four.
     pub fn serialized(&self) -> Vec<u8> {
         let order = u8::from(self.order == Order::Little);

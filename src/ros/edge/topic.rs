@@ -175,14 +175,7 @@ impl<M: Message> Subscription<M> {
 
     /// The newest message not yet taken; older ones are dropped.
     pub fn take_last(&self) -> Option<(M, Stamps)> {
-        let mut last = None;
-        for _ in 0..MOST_AT_ONCE {
-            match self.take() {
-                None => break,
-                newer => last = newer,
-            }
-        }
-        last
+        std::iter::from_fn(|| self.take()).take(MOST_AT_ONCE).last()
     }
 
     fn refuse(&self, reason: &str) {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::pose::PoseSource;
+use super::pose::{PoseSource, each};
 use super::{NodeError, TopicOf, copy};
 use crate::messages::builtin_interfaces::Time;
 use crate::messages::flockform_msgs::Ranges;
@@ -80,18 +80,12 @@ impl Link {
         topic: TopicOf<'_>,
     ) -> Result<Self, NodeError> {
         let formation = control.formation();
-        let mut leaders = Vec::new();
-        for m in formation.moved().filter(|m| part.mine.contains(m)) {
-            leaders
-                .push((m, node.subscription(&topic(&raw.leader_topic, m)?, Quality::BEST_EFFORT)?.steady()));
-        }
+        let moved = formation.moved().filter(|m| part.mine.contains(m));
+        let leaders = each(node, moved, |m| topic(&raw.leader_topic, m))?;
         let targets = TargetTopics::open(node, raw, formation.count(), &part.mine, topic)?;
-        let mut ranges = Vec::new();
         let has_ranges = control.watch().limits().ranges.is_some();
-        for &m in part.heard.iter().filter(|_| has_ranges) {
-            ranges
-                .push((m, node.subscription(&topic(&raw.ranges_topic, m)?, Quality::BEST_EFFORT)?.steady()));
-        }
+        let ranging = part.heard.iter().copied().filter(|_| has_ranges);
+        let ranges = each(node, ranging, |m| topic(&raw.ranges_topic, m))?;
         let poses = PoseSource::open(node, raw, &part.heard, topic)?;
         Ok(Self {
             poses,
@@ -108,9 +102,7 @@ impl Link {
             recorder: None,
         })
     }
-}
 
-impl Link {
     /// Of each source of poses, whether those that sent them have taken leave.
     pub fn left(&self) -> Vec<Option<bool>> {
         self.poses.left()

@@ -2,6 +2,7 @@
 
 use super::recorder::MessageRecorder;
 use super::{NodeError, TopicOf};
+use crate::messages::Message;
 use crate::messages::formation::pose::pose;
 use crate::messages::geometry_msgs::{self, PoseArray, PoseStamped, PoseWithCovarianceStamped};
 use crate::messages::nav_msgs::Odometry;
@@ -24,13 +25,14 @@ const MOST_AT_ONCE: usize = 64;
 
 impl PoseSource {
     pub fn open(node: &Node, raw: &RawNode, heard: &[usize], topic: TopicOf<'_>) -> Result<Self, NodeError> {
+        let members = heard.iter().copied();
+        let of = |m| topic(&raw.pose_topic, m);
         Ok(match raw.pose_type {
-            RawPoseType::PoseStamped => Self::Stamped(each(node, raw, heard, topic)?),
-            RawPoseType::PoseWithCovarianceStamped => Self::WithCovariance(each(node, raw, heard, topic)?),
-            RawPoseType::Odometry => Self::Odometry(each(node, raw, heard, topic)?),
+            RawPoseType::PoseStamped => Self::Stamped(each(node, members, of)?),
+            RawPoseType::PoseWithCovarianceStamped => Self::WithCovariance(each(node, members, of)?),
+            RawPoseType::Odometry => Self::Odometry(each(node, members, of)?),
             RawPoseType::PoseArray => {
-                let topic = topic(&raw.pose_topic, 0)?;
-                let topic = node.subscription(&topic, Quality::BEST_EFFORT)?.steady();
+                let topic = node.subscription(&of(0)?, Quality::BEST_EFFORT)?.steady();
                 Self::Array(Box::new(topic), heard.to_vec())
             }
         })
@@ -93,20 +95,17 @@ impl PoseSource {
     }
 }
 
-fn each<M: crate::messages::Message>(
+/// A steady topic of each of these members.
+pub fn each<M: Message>(
     node: &Node,
-    raw: &RawNode,
-    heard: &[usize],
-    topic: TopicOf<'_>,
+    members: impl Iterator<Item = usize>,
+    topic: impl Fn(usize) -> Result<String, NodeError>,
 ) -> Result<Vec<(usize, Subscription<M>)>, NodeError> {
-    let open = |&member: &usize| {
-        let topic = topic(&raw.pose_topic, member)?;
-        Ok((member, node.subscription(&topic, Quality::BEST_EFFORT)?.steady()))
-    };
-    heard.iter().map(open).collect()
+    let open = |m| Ok((m, node.subscription(&topic(m)?, Quality::BEST_EFFORT)?.steady()));
+    members.map(open).collect()
 }
 
-fn drain<M: crate::messages::Message>(
+fn drain<M: Message>(
     all: &[(usize, Subscription<M>)],
     parts: impl Fn(&M) -> (&Header, &geometry_msgs::Pose),
     pose: impl Fn(&Header, &geometry_msgs::Pose, Stamps) -> Pose,
@@ -122,7 +121,7 @@ fn drain<M: crate::messages::Message>(
     }
 }
 
-fn copy<M: crate::messages::Message>(
+fn copy<M: Message>(
     recorder: &mut Option<(&mut MessageRecorder, f64)>,
     topic: &str,
     message: &M,

@@ -99,7 +99,10 @@ impl Document {
                 Ok(Err(panic)) => std::panic::resume_unwind(panic),
                 // No threads on this platform at all.
                 Err(error) if error.kind() == ErrorKind::Unsupported => parse(),
-                Err(error) => Err(unread_problem(file, &error).into()),
+                Err(error) => {
+                    let message = format!("cannot be parsed, since no thread can be started: {error}");
+                    Err(Problem::of_file(file, message, None).into())
+                }
             }
         })
     }
@@ -108,14 +111,8 @@ impl Document {
         let parsed = DeTable::parse(text).map_err(|error| syntax_problem(file, text, &error))?;
         let lines = Lines::of(text);
         let content = table(parsed.into_inner(), &|offset| Origin::Line(lines.line_of(offset)), 0);
-        let mut root = Node { origin: Origin::File, content };
-        let mut refused = SceneError::default();
-        for (index, text) in overrides.iter().enumerate() {
-            if let Err(problem) = overrides::apply(&mut root, text, Origin::Override(index)) {
-                refused.push(*problem);
-            }
-        }
-        refused.into_result(Document { file: file.to_owned(), overrides: overrides.to_vec(), root })
+        let root = Node { origin: Origin::File, content };
+        Document { file: file.to_owned(), overrides: Vec::new(), root }.overridden(overrides)
     }
 
     /// The document with more overrides after its own.
@@ -123,16 +120,19 @@ impl Document {
     /// # Errors
     /// Every override that is malformed or cannot be placed.
     pub(crate) fn with(&self, more: &[String]) -> Result<Document, SceneError> {
-        let mut document = self.clone();
+        self.clone().overridden(more)
+    }
+
+    fn overridden(mut self, more: &[String]) -> Result<Document, SceneError> {
         let mut refused = SceneError::default();
         for text in more {
-            let origin = Origin::Override(document.overrides.len());
-            document.overrides.push(text.clone());
-            if let Err(problem) = overrides::apply(&mut document.root, text, origin) {
+            let origin = Origin::Override(self.overrides.len());
+            self.overrides.push(text.clone());
+            if let Err(problem) = overrides::apply(&mut self.root, text, origin) {
                 refused.push(*problem);
             }
         }
-        refused.into_result(document)
+        refused.into_result(self)
     }
 
     /// The document as a value that fits `schema`, which is a JSON Schema as schemars derives it.
@@ -296,29 +296,15 @@ fn fits_64_bits(value: i128) -> bool {
 fn syntax_problem(file: &str, text: &str, error: &Error) -> Problem {
     let line = error.span().map(|span| Lines::of(text).line_of(span.start));
     let reads = line.and_then(|line| text.lines().nth(line - 1)).map(str::trim);
-    Problem {
-        place: match line {
-            Some(line) => Place::Line { file: file.to_owned(), line },
-            None => Place::File { file: file.to_owned() },
-        },
-        key: String::new(),
-        found: None,
-        message: format!("not valid TOML: {}", error.message()),
-        help: reads.filter(|reads| !reads.is_empty()).map(|reads| {
-            let shown: String = reads.chars().take(SHOWN_CHARACTERS).collect();
-            format!("the line reads `{shown}`")
-        }),
+    let help = reads.filter(|reads| !reads.is_empty()).map(|reads| {
+        let shown: String = reads.chars().take(SHOWN_CHARACTERS).collect();
+        format!("the line reads `{shown}`")
+    });
+    let mut problem = Problem::of_file(file, format!("not valid TOML: {}", error.message()), help);
+    if let Some(line) = line {
+        problem.place = Place::Line { file: file.to_owned(), line };
     }
-}
-
-fn unread_problem(file: &str, error: &std::io::Error) -> Problem {
-    Problem {
-        place: Place::File { file: file.to_owned() },
-        key: String::new(),
-        found: None,
-        message: format!("cannot be parsed, since no thread can be started: {error}"),
-        help: None,
-    }
+    problem
 }
 
 /// The offsets at which lines end, to turn byte offsets into line numbers.

@@ -52,6 +52,14 @@ pub struct Problem {
     pub help: Option<String>,
 }
 
+impl Problem {
+    /// A problem with a file as a whole.
+    pub(crate) fn of_file(file: &str, message: String, help: Option<String>) -> Self {
+        let place = Place::File { file: file.to_owned() };
+        Self { place, key: String::new(), found: None, message, help }
+    }
+}
+
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: ", self.place)?;

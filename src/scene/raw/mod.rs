@@ -11,6 +11,7 @@ mod actions;
 mod body;
 mod load_steps;
 mod material;
+mod meant;
 mod roles;
 mod rule;
 

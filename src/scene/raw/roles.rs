@@ -4,7 +4,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::RawAxis;
-use crate::flock::motion::Interpolation;
 
 /// A role for the particles of a region.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
@@ -240,14 +239,4 @@ pub enum RawInterpolation {
     Smooth,
     /// Jumps.
     Hold,
-}
-
-impl From<RawInterpolation> for Interpolation {
-    fn from(raw: RawInterpolation) -> Self {
-        match raw {
-            RawInterpolation::Linear => Interpolation::Linear,
-            RawInterpolation::Smooth => Interpolation::Smooth,
-            RawInterpolation::Hold => Interpolation::Hold,
-        }
-    }
 }

@@ -45,8 +45,7 @@ pub fn equilibrium(raw: &RawScene, refuse: Refuse<'_>) -> Result<Option<Equilibr
     let has_single = has_single && !corotated;
     let singles = accuracy.is_some_and(|a| a >= SINGLES_FROM) && has_single && tolerance >= SINGLE_FLOOR;
     let precision = match asked.precision {
-        Some(RawPrecision::F64) => Precision::F64,
-        Some(RawPrecision::F32) => Precision::F32,
+        Some(asked) => asked.into(),
         None if singles => Precision::F32,
         None => Precision::F64,
     };

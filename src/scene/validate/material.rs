@@ -3,7 +3,6 @@
 use super::{Refuse, roles};
 use crate::flock::lattice::Lattice;
 use crate::flock::neighbourhood::Neighbourhood;
-use crate::flock::rules::Rotation;
 use crate::material::cells;
 use crate::material::elastic::{Constants, Elastic, ElasticError, Plane};
 use crate::material::homogenise::Crystal;
@@ -19,11 +18,7 @@ const OF_DAMPING_LIMIT: f64 = 0.9;
 pub fn elastic(raw: &RawMaterial, at: &str, refuse: Refuse<'_>) -> Result<Elastic, SceneError> {
     let (constants, thickness) = match *raw {
         RawMaterial::Isotropic { young, poisson, plane, thickness } => {
-            let plane = match plane {
-                RawPlane::Stress => Plane::Stress,
-                RawPlane::Strain => Plane::Strain,
-            };
-            (Constants::Isotropic { young, poisson, plane }, thickness)
+            (Constants::Isotropic { young, poisson, plane: plane.into() }, thickness)
         }
         RawMaterial::Orthotropic { young, poisson_12, shear, angle, thickness } => {
             let angle = angle.to_radians();
@@ -93,13 +88,6 @@ pub fn inclusions(
         Ok(Inclusion { shape, material })
     };
     raw.body.inclusions.iter().enumerate().map(inclusion).collect()
-}
-
-pub fn rotation(raw: RawRotation) -> Rotation {
-    match raw {
-        RawRotation::Small => Rotation::Small,
-        RawRotation::Corotated => Rotation::Corotated,
-    }
 }
 
 /// The neighbourhood as written, or what the rule needs where none is.

@@ -12,20 +12,20 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::document::Document;
-use super::document::problem::{Place, Problem, SceneError};
+use super::document::problem::{Problem, SceneError};
 use super::raw::*;
 use super::{BodySource, Fracture, PoissonTerm, Record, Scene, Stop, Weights, text};
 use crate::flock::body::Cut;
-use crate::flock::fracture::{Ghosts, Threshold};
+use crate::flock::fracture::Threshold;
 use crate::flock::frame::FrameRule;
 use crate::flock::lattice::{Lattice, LatticeKind};
 use crate::flock::neighbourhood::Neighbourhood;
-use crate::flock::rules::{Axis, Feedback, FeedbackReference, Mean, Origin};
+use crate::flock::rules::{Feedback, Mean, Origin};
 use crate::geometry::piece::Piece;
 use crate::geometry::shape::{Segment, Shape};
 use crate::geometry::specimen::Specimen;
 use crate::material::elastic::Elastic;
-use crate::sweep::{Order, Update};
+use crate::sweep::Update;
 
 impl Scene {
     /// Reads a scene file from disk; `overrides` are `KEY.PATH=VALUE` texts applied on top.
@@ -43,22 +43,16 @@ impl Scene {
         overrides: &[String],
         folder: Option<&Path>,
     ) -> Result<Self, SceneError> {
-        let document = Document::parse(file, text, overrides)?;
-        let raw = document.read(&schema())?;
-        validate(name, raw, document, folder)
+        build(name, Document::parse(file, text, overrides)?, folder)
     }
-}
 
-impl Scene {
     /// The scene with more keys set after those that it was read with, from the text that was read then. Files are
     /// looked up in `folder`.
     ///
     /// # Errors
     /// Keys that cannot be set so.
     pub fn with(&self, set: &[String], folder: Option<&Path>) -> Result<Self, SceneError> {
-        let document = self.document.with(set)?;
-        let raw = document.read(&schema())?;
-        validate(&self.name, raw, document, folder)
+        build(&self.name, self.document.with(set)?, folder)
     }
 
     /// The scene without what puts its body to rest at once: a body to be stepped. Files are looked up in `folder`.
@@ -72,6 +66,11 @@ impl Scene {
         }
         validate(&self.name, raw, self.document.clone(), folder)
     }
+}
+
+fn build(name: &str, document: Document, folder: Option<&Path>) -> Result<Scene, SceneError> {
+    let raw = document.read(&schema())?;
+    validate(name, raw, document, folder)
 }
 
 /// The JSON Schema of a scene file.
@@ -96,13 +95,10 @@ impl File {
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         match text::read(path) {
             Ok(text) => Ok(Self { name, file, text }),
-            Err(error) => Err(SceneError::from(Problem {
-                place: Place::File { file },
-                key: String::new(),
-                found: None,
-                message: format!("cannot be read: {error}"),
-                help: Some(help.to_owned()),
-            })),
+            Err(error) => {
+                let message = format!("cannot be read: {error}");
+                Err(Problem::of_file(&file, message, Some(help.to_owned())).into())
+            }
         }
     }
 }
@@ -159,19 +155,13 @@ pub(super) fn validate(
             && !matches!(raw.neighbours, Some(RawNeighbours::Dynamic { .. })),
         poisson: raw.rule.poisson.as_ref().map(|p| PoissonTerm {
             k: p.k,
-            axis: match p.axis {
-                RawAxis::X => Axis::X,
-                RawAxis::Y => Axis::Y,
-            },
+            axis: p.axis.into(),
             centre: p.centre,
             exponent: p.exponent,
         }),
         feedback: raw.rule.feedback.as_ref().map(feedback),
         update: Update {
-            order: match raw.update.order {
-                RawOrder::Synchronous => Order::Synchronous,
-                RawOrder::Sequential => Order::Sequential,
-            },
+            order: raw.update.order.into(),
             damping: material::damping(&raw, &lattice, elastic.as_ref(), &inclusions),
         },
         loads: material::loads(&raw.loads, refuse)?,
@@ -441,18 +431,12 @@ pub(super) fn mean(raw: &RawMean, spacing: f64, refuse: Refuse<'_>) -> Result<Me
         RawMean::Power { exponent, origin: from } => Mean::Power { exponent, origin: origin(from) },
         RawMean::Median => Mean::Median,
         RawMean::Spaced { spacing, power } => Mean::Spaced { spacing, power },
-        RawMean::Material { rotation } => Mean::Material { rotation: material::rotation(rotation) },
+        RawMean::Material { rotation } => Mean::Material { rotation: rotation.into() },
     })
 }
 
 pub(super) fn feedback(raw: &RawFeedback) -> Feedback {
-    Feedback {
-        factor: raw.factor,
-        reference: match raw.reference {
-            RawFeedbackReference::Initial => FeedbackReference::Initial,
-            RawFeedbackReference::Previous => FeedbackReference::Previous,
-        },
-    }
+    Feedback { factor: raw.factor, reference: raw.reference.into() }
 }
 
 fn weights(raw: &Option<RawWeights>, refuse: Refuse<'_>) -> Result<Option<Weights>, SceneError> {
@@ -496,12 +480,7 @@ fn fracture(raw: &Option<RawFracture>, refuse: Refuse<'_>) -> Result<Option<Frac
             ));
         }
     };
-    let ghosts = match raw.ghosts {
-        RawGhosts::Lattice => Ghosts::Lattice,
-        RawGhosts::Mirrored => Ghosts::Mirrored,
-        RawGhosts::None => Ghosts::None,
-    };
-    Ok(Some(Fracture { threshold, ghosts }))
+    Ok(Some(Fracture { threshold, ghosts: raw.ghosts.into() }))
 }
 
 fn cuts(raw: &[RawCut], refuse: Refuse<'_>) -> Result<Vec<Segment>, SceneError> {

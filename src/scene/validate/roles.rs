@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use super::{Refuse, ordered_box};
-use crate::flock::condition::{Condition, Quantity};
+use crate::flock::condition::Condition;
 use crate::flock::motion::{Keyframe, Motion};
-use crate::flock::region::{Region, Side};
+use crate::flock::region::Region;
 use crate::flock::role::Role;
 use crate::flock::rules::Axis;
 use crate::geometry::portion::Selection;
@@ -21,12 +21,7 @@ pub fn role_entry(
     folder: Option<&Path>,
     refuse: Refuse<'_>,
 ) -> Result<RoleEntry, SceneError> {
-    let role = match raw.role {
-        RawRole::Follower => Role::Follower,
-        RawRole::Leader => Role::Leader,
-        RawRole::Clamped => Role::Clamped,
-        RawRole::Ghost => Role::Ghost,
-    };
+    let role = Role::from(raw.role);
     match (role, &raw.motion) {
         (Role::Leader, None) => {
             let help =
@@ -41,25 +36,15 @@ pub fn role_entry(
     }
     let when = raw.when.as_ref().map(|when| condition(key, when, refuse)).transpose()?;
     let motion = raw.motion.as_ref().map(|motion| leader_motion(key, motion, folder, refuse)).transpose()?;
-    let axis = raw.axis.map(|axis| match axis {
-        RawAxis::X => Axis::X,
-        RawAxis::Y => Axis::Y,
-    });
     let region = region(key, &raw.region, refuse)?;
-    Ok(RoleEntry { region, role, axis, from: raw.from.max(1), when, motion })
+    Ok(RoleEntry { region, role, axis: raw.axis.map(Axis::from), from: raw.from.max(1), when, motion })
 }
 
 pub fn region(key: &str, raw: &RawRegion, refuse: Refuse<'_>) -> Result<SceneRegion, SceneError> {
-    let side = |side: RawSide| match side {
-        RawSide::Left => Side::Left,
-        RawSide::Right => Side::Right,
-        RawSide::Bottom => Side::Bottom,
-        RawSide::Top => Side::Top,
-    };
     Ok(SceneRegion::Known(match raw {
         RawRegion::All {} => Region::All,
-        RawRegion::Edge { side: s, depth: None } => return Ok(SceneRegion::Outermost(side(*s))),
-        RawRegion::Edge { side: s, depth: Some(depth) } => Region::Edge { side: side(*s), depth: *depth },
+        RawRegion::Edge { side, depth: None } => return Ok(SceneRegion::Outermost((*side).into())),
+        RawRegion::Edge { side, depth: Some(depth) } => Region::Edge { side: (*side).into(), depth: *depth },
         RawRegion::Box { min, max } => {
             ordered_box(&format!("{key}.region"), *min, *max, refuse)?;
             Region::Box { min: *min, max: *max }
@@ -116,14 +101,7 @@ fn condition(key: &str, raw: &RawWhen, refuse: Refuse<'_>) -> Result<Condition, 
         let help = "give the lower bound as above, or two entries, one for each bound";
         return Err(refuse(&format!("{key}.when.above"), message, help));
     }
-    let quantity = match raw.quantity {
-        RawQuantity::X => Quantity::X,
-        RawQuantity::Y => Quantity::Y,
-        RawQuantity::Displacement => Quantity::Displacement,
-        RawQuantity::Pe1 => Quantity::Pe1,
-        RawQuantity::Pe2 => Quantity::Pe2,
-    };
-    Ok(Condition { quantity, above: raw.above, below: raw.below })
+    Ok(Condition { quantity: raw.quantity.into(), above: raw.above, below: raw.below })
 }
 
 fn leader_motion(

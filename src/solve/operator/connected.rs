@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::Operator;
 use super::matrix::{HELD, Matrix, Run};
+use crate::geometry::lists::lists_of;
 use crate::solve::shared::{SystemPart, receive_flags};
 
 /// Sweeps to and fro before single particles are followed: almost every body is done after one.
@@ -58,23 +59,13 @@ impl Operator {
                 let of = |k: u32| {
                     let i = (run.start + k) as usize;
                     let others = matrix.distances(run)[1..].iter();
-                    others.map(move |&distance| (i as u32, i.wrapping_add_signed(distance as isize)))
+                    others.map(move |&distance| (i.wrapping_add_signed(distance as isize) as u32, i as u32))
                 };
                 (0..run.len).flat_map(of)
             })
         };
         // For each particle those that feel it, in compressed form.
-        let mut starts = vec![0u32; reached.len() + 1];
-        connections().for_each(|(_, felt)| starts[felt + 1] += 1);
-        for i in 0..reached.len() {
-            starts[i + 1] += starts[i];
-        }
-        let mut next = starts.clone();
-        let mut feels = vec![0u32; starts[reached.len()] as usize];
-        for (i, felt) in connections() {
-            feels[next[felt] as usize] = i;
-            next[felt] += 1;
-        }
+        let (starts, feels) = lists_of(reached.len(), connections);
         let mut fresh: Vec<u32> = (0..reached.len() as u32).filter(|&i| reached[i as usize]).collect();
         while let Some(felt) = fresh.pop() {
             let those = starts[felt as usize] as usize..starts[felt as usize + 1] as usize;

@@ -1,10 +1,11 @@
 //! The state machine. Pure.
 
 /// Primary and transition states; the numbers are those of `lifecycle_msgs/msg/State`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum State {
     Unknown = 0,
+    #[default]
     Unconfigured = 1,
     Inactive = 2,
     Active = 3,
@@ -132,15 +133,9 @@ pub enum Outcome {
 }
 
 /// Where a node stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Machine {
     state: State,
-}
-
-impl Default for Machine {
-    fn default() -> Self {
-        Self { state: State::Unconfigured }
-    }
 }
 
 impl Machine {

@@ -2,51 +2,72 @@
 
 use crate::messages::rcl_interfaces::ParameterValue;
 
-/// A parameter's value.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Value {
-    Bool(bool),
-    Integer(i64),
-    Double(f64),
-    String(String),
-    Bytes(Vec<u8>),
-    Bools(Vec<bool>),
-    Integers(Vec<i64>),
-    Doubles(Vec<f64>),
-    Strings(Vec<String>),
+/// The types of parameters: name of each here, its content, its number in `rcl_interfaces/msg/ParameterType`, its name as
+/// ROS 2's tools print it, and the field of [`ParameterValue`] that it travels in.
+macro_rules! types {
+    ($($kind:ident($content:ty) = $number:literal, $name:literal, $field:ident;)+) => {
+        /// A parameter's value.
+        #[derive(Clone, Debug, PartialEq)]
+        pub enum Value {
+            $($kind($content),)+
+        }
+
+        impl Value {
+            /// Number in `rcl_interfaces/msg/ParameterType`.
+            pub fn kind(&self) -> u8 {
+                match self {
+                    $(Value::$kind(_) => $number,)+
+                }
+            }
+
+            /// Name of the type as ROS 2's tools print it.
+            pub(crate) fn kind_name(&self) -> &'static str {
+                match self {
+                    $(Value::$kind(_) => $name,)+
+                }
+            }
+
+            /// As it travels.
+            pub fn to_wire(&self) -> ParameterValue {
+                let mut wire = ParameterValue { kind: self.kind(), ..ParameterValue::default() };
+                match self.clone() {
+                    $(Value::$kind(value) => wire.$field = value,)+
+                }
+                wire
+            }
+
+            /// From the wire; `None` for "not set" and for types that do not exist.
+            pub(crate) fn from_wire(wire: ParameterValue) -> Option<Value> {
+                match wire.kind {
+                    $($number => Some(Value::$kind(wire.$field)),)+
+                    _ => None,
+                }
+            }
+        }
+
+        impl std::fmt::Display for Value {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                match self {
+                    $(Value::$kind(value) => write!(f, "{value:?}"),)+
+                }
+            }
+        }
+    };
+}
+
+types! {
+    Bool(bool) = 1, "bool", bool_value;
+    Integer(i64) = 2, "integer", integer_value;
+    Double(f64) = 3, "double", double_value;
+    String(String) = 4, "string", string_value;
+    Bytes(Vec<u8>) = 5, "byte_array", byte_array_value;
+    Bools(Vec<bool>) = 6, "bool_array", bool_array_value;
+    Integers(Vec<i64>) = 7, "integer_array", integer_array_value;
+    Doubles(Vec<f64>) = 8, "double_array", double_array_value;
+    Strings(Vec<String>) = 9, "string_array", string_array_value;
 }
 
 impl Value {
-    /// Number in `rcl_interfaces/msg/ParameterType`.
-    pub fn kind(&self) -> u8 {
-        match self {
-            Value::Bool(_) => 1,
-            Value::Integer(_) => 2,
-            Value::Double(_) => 3,
-            Value::String(_) => 4,
-            Value::Bytes(_) => 5,
-            Value::Bools(_) => 6,
-            Value::Integers(_) => 7,
-            Value::Doubles(_) => 8,
-            Value::Strings(_) => 9,
-        }
-    }
-
-    /// Name of the type as ROS 2's tools print it.
-    pub(crate) fn kind_name(&self) -> &'static str {
-        match self {
-            Value::Bool(_) => "bool",
-            Value::Integer(_) => "integer",
-            Value::Double(_) => "double",
-            Value::String(_) => "string",
-            Value::Bytes(_) => "byte_array",
-            Value::Bools(_) => "bool_array",
-            Value::Integers(_) => "integer_array",
-            Value::Doubles(_) => "double_array",
-            Value::Strings(_) => "string_array",
-        }
-    }
-
     pub fn as_bool(&self) -> Option<bool> {
         if let Value::Bool(value) = self { Some(*value) } else { None }
     }
@@ -85,80 +106,19 @@ impl Value {
             _ => false,
         }
     }
+}
 
-    /// As it travels.
-    pub fn to_wire(&self) -> ParameterValue {
-        let mut wire = ParameterValue { kind: self.kind(), ..ParameterValue::default() };
-        match self.clone() {
-            Value::Bool(value) => wire.bool_value = value,
-            Value::Integer(value) => wire.integer_value = value,
-            Value::Double(value) => wire.double_value = value,
-            Value::String(value) => wire.string_value = value,
-            Value::Bytes(value) => wire.byte_array_value = value,
-            Value::Bools(value) => wire.bool_array_value = value,
-            Value::Integers(value) => wire.integer_array_value = value,
-            Value::Doubles(value) => wire.double_array_value = value,
-            Value::Strings(value) => wire.string_array_value = value,
+macro_rules! from {
+    ($($content:ty => $kind:ident),+) => {$(
+        impl From<$content> for Value {
+            fn from(value: $content) -> Self {
+                Value::$kind(value.into())
+            }
         }
-        wire
-    }
-
-    /// From the wire; `None` for "not set" and for types that do not exist.
-    pub(crate) fn from_wire(wire: ParameterValue) -> Option<Value> {
-        Some(match wire.kind {
-            1 => Value::Bool(wire.bool_value),
-            2 => Value::Integer(wire.integer_value),
-            3 => Value::Double(wire.double_value),
-            4 => Value::String(wire.string_value),
-            5 => Value::Bytes(wire.byte_array_value),
-            6 => Value::Bools(wire.bool_array_value),
-            7 => Value::Integers(wire.integer_array_value),
-            8 => Value::Doubles(wire.double_array_value),
-            9 => Value::Strings(wire.string_array_value),
-            _ => return None,
-        })
-    }
+    )+};
 }
 
-impl std::fmt::Display for Value {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Value::Bool(value) => write!(f, "{value}"),
-            Value::Integer(value) => write!(f, "{value}"),
-            Value::Double(value) => write!(f, "{value:?}"),
-            Value::String(value) => write!(f, "{value:?}"),
-            Value::Bytes(values) => write!(f, "{values:?}"),
-            Value::Bools(values) => write!(f, "{values:?}"),
-            Value::Integers(values) => write!(f, "{values:?}"),
-            Value::Doubles(values) => write!(f, "{values:?}"),
-            Value::Strings(values) => write!(f, "{values:?}"),
-        }
-    }
-}
-
-impl From<bool> for Value {
-    fn from(value: bool) -> Self {
-        Value::Bool(value)
-    }
-}
-
-impl From<i64> for Value {
-    fn from(value: i64) -> Self {
-        Value::Integer(value)
-    }
-}
-
-impl From<f64> for Value {
-    fn from(value: f64) -> Self {
-        Value::Double(value)
-    }
-}
-
-impl From<&str> for Value {
-    fn from(value: &str) -> Self {
-        Value::String(value.into())
-    }
-}
+from!(bool => Bool, i64 => Integer, f64 => Double, &str => String);
 
 #[cfg(test)]
 mod tests {

@@ -1,0 +1,33 @@
+//! Lists of indices: sorted, around a polygon, or many of them one after the other.
+
+/// Sorts members into so many lists, each in the order in which `pairs` has its members: where each list begins, shape
+/// \[count + 1\], and the members of all. `pairs` gives each member after its list, the same each time.
+pub(crate) fn lists_of<I: Iterator<Item = (u32, u32)>>(
+    count: usize,
+    pairs: impl Fn() -> I,
+) -> (Vec<u32>, Vec<u32>) {
+    let mut starts = vec![0; count + 1];
+    pairs().for_each(|(list, _)| starts[list as usize + 1] += 1);
+    for list in 0..count {
+        starts[list + 1] += starts[list];
+    }
+    let (mut next, mut members) = (starts.clone(), vec![0; starts[count] as usize]);
+    for (list, member) in pairs() {
+        members[next[list as usize] as usize] = member;
+        next[list as usize] += 1;
+    }
+    (starts, members)
+}
+
+/// Each of these once, ascending.
+pub(crate) fn distinct<T: Ord>(of: impl IntoIterator<Item = T>) -> Vec<T> {
+    let mut all: Vec<T> = of.into_iter().collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// The sides of a polygon: each corner and the next.
+pub(crate) fn ways<T: Copy>(corners: &[T]) -> impl Iterator<Item = [T; 2]> {
+    (0..corners.len()).map(|k| [corners[k], corners[(k + 1) % corners.len()]])
+}
