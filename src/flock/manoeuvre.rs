@@ -3,7 +3,7 @@
 //! A rule whose weights reproduce each follower's place (patch test) carries any affine motion of the
 //! leaders over to the followers exactly, so a manoeuvre of the leaders is one of the formation.
 
-use super::block::{Block, IDENTITY, apply};
+use super::block::{Block, IDENTITY, apply, inverse, product};
 use super::vectors::Vectors;
 
 /// `x -> about + translate + matrix (x - about)` \[length, world frame\].
@@ -55,8 +55,45 @@ impl Posture {
         Affine { about, translate: self.translate, matrix }
     }
 
+    /// The same map, counted from another point that is turned about than `from`.
+    pub fn about(&self, to: [f64; 2], from: [f64; 2]) -> Self {
+        let way = [to[0] - from[0], to[1] - from[1]];
+        let moved = apply(&self.affine(from).matrix, way);
+        Self { translate: [0, 1].map(|k| self.translate[k] + (moved[k] - way[k])), ..*self }
+    }
+
+    /// The posture about `about` \[length\] that carries places nearest to where they are, by least squares; of places on
+    /// one line, one without shear.
+    pub fn fitted(about: [f64; 2], carried: &[([f64; 2], [f64; 2])]) -> Self {
+        let mean = |of: fn(&([f64; 2], [f64; 2])) -> [f64; 2]| {
+            [0, 1].map(|k| carried.iter().map(|pair| of(pair)[k]).sum::<f64>() / carried.len().max(1) as f64)
+        };
+        let (middle, to) = (mean(|pair| pair.0), mean(|pair| pair.1));
+        // Sums of the products of coordinates, before with before and after with before.
+        let (mut before, mut after) = ([[0.0; 2]; 2], [[0.0; 2]; 2]);
+        for (place, now) in carried {
+            for (i, k) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                before[i][k] += (place[i] - middle[i]) * (place[k] - middle[k]);
+                after[i][k] += (now[i] - to[i]) * (place[k] - middle[k]);
+            }
+        }
+        let size = before[0][0] + before[1][1];
+        let (along, across) = (after[0][0] + after[1][1], after[1][0] - after[0][1]);
+        let is_flat = before[0][0] * before[1][1] - before[0][1] * before[1][0] <= 1e-9 * size * size;
+        let matrix = match inverse(&before).filter(|_| !is_flat) {
+            Some(inverse) => product(&after, &inverse),
+            None if size > 0.0 => [[along / size, -across / size], [across / size, along / size]],
+            None => IDENTITY,
+        };
+        let rotate = (matrix[1][0] - matrix[0][1]).atan2(matrix[0][0] + matrix[1][1]);
+        let (sin, cos) = rotate.sin_cos();
+        let [[sx, hx], [hy, sy]] = product(&[[cos, sin], [-sin, cos]], &matrix);
+        let shift = [to[0] - middle[0], to[1] - middle[1]];
+        Self { translate: shift, rotate, stretch: [sx, sy], shear: [hx, hy] }.about(about, middle)
+    }
+
     /// Stretch and shear, before the turn.
-    fn shape(&self) -> Block {
+    pub(crate) fn shape(&self) -> Block {
         [[self.stretch[0], self.shear[0]], [self.shear[1], self.stretch[1]]]
     }
 
@@ -221,6 +258,24 @@ mod tests {
         let [x, y] = posed().affine([1.0, 1.0]).apply([2.0, 3.0]);
         // (1, 2) from the centre, stretched and sheared (3, 2), turned (-2, 3).
         assert!((x - 4.0).abs() < 1e-15 && (y - 4.0).abs() < 1e-15, "{x} {y}");
+    }
+
+    #[test]
+    fn a_posture_is_the_same_about_another_point_and_is_found_again_where_it_led() {
+        let near = |a: [f64; 2], b: [f64; 2]| distance(a, b) < 1e-12;
+        let places = [[0.0, 0.0], [2.0, 0.5], [-1.0, 3.0], [4.0, 4.0]];
+        let there = posed().affine([1.0, 1.0]);
+        let moved = posed().about([-3.0, 7.0], [1.0, 1.0]).affine([-3.0, 7.0]);
+        let carried = places.map(|place| (place, there.apply(place)));
+        let found = Posture::fitted([0.5, 2.0], &carried).affine([0.5, 2.0]);
+        // Two leaders are turned and stretched alike, one is shifted.
+        let [two, one] =
+            [2, 1].map(|count| Posture::fitted([9.0, 9.0], &carried[..count]).affine([9.0, 9.0]));
+        for (k, (place, to)) in carried.into_iter().enumerate() {
+            assert!(near(moved.apply(place), to) && near(found.apply(place), to), "{place:?}");
+            assert!(k >= 2 || near(two.apply(place), to), "{place:?} of two");
+            assert!(k >= 1 || near(one.apply(place), to) && one.matrix == IDENTITY, "{place:?} alone");
+        }
     }
 
     #[test]

@@ -22,7 +22,7 @@ use crate::messages::names::Names;
 use crate::messages::recorder::{parameters, set_parameter};
 use crate::messages::std_msgs::Header;
 use crate::scene::swarm::Swarm;
-use crate::swarm::control::{Control, ControlSnapshot, Mode, scope};
+use crate::swarm::control::{Control, ControlSnapshot, scope};
 use crate::swarm::flight::{FlightCommand, commands};
 use crate::swarm::watch::Range;
 
@@ -334,14 +334,10 @@ impl Replay {
         }
     }
 
-    /// As the node does in its transition `configure`: an emergency stop outlasts it.
+    /// As the node does in its transition `configure`.
     fn begin_anew(&mut self) {
-        let is_stopped = self.control.mode() == Mode::EmergencyStopped;
-        self.control.clone_from(&self.fresh);
+        self.control.begin_anew(&self.fresh);
         self.control.set_active(self.active);
-        if is_stopped {
-            self.control.emergency_stop();
-        }
         // The parameters that follow are those of a start.
         self.begun = false;
     }

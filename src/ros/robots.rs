@@ -39,7 +39,7 @@ use crate::swarm::flight::Fleet;
 use crate::swarm::formation::Formation;
 use crate::swarm::pace::{Pace, system_time};
 use crate::swarm::robots::Robot;
-use crate::swarm::transport::{RobotsEnd, fly};
+use crate::swarm::transport::{RobotsEnd, catch_up, fly};
 use crate::swarm::watch::{Pose, Range};
 
 /// The robots, and what they speak through.
@@ -256,7 +256,11 @@ impl RobotNodes {
     /// As [`FormationNode::run_while`](super::node::FormationNode::run_while).
     pub fn run_while(&mut self, stop: &AtomicBool, look: &mut dyn FnMut(&Self) -> bool) -> bool {
         while !stop.load(Ordering::Relaxed) {
-            self.pace.wait();
+            let missed = self.pace.wait();
+            // A clock of their own waits.
+            if self.link.clock.is_none() {
+                catch_up(&mut self.fleet, &self.goals, missed);
+            }
             self.tick();
             if let Some(pulse) = &self.pulse {
                 let was_sent = std::mem::take(&mut self.link.was_sent);
@@ -319,10 +323,11 @@ impl RobotNodes {
 
     /// One period: targets in, poses out.
     pub fn tick(&mut self) {
-        let Self { fleet, goals, link, pulse, rosout, .. } = self;
-        // The publisher of the simulated time starts it.
+        let Self { fleet, goals, link, pulse, rosout, pace, .. } = self;
+        // The publisher of the simulated time starts it. By the computer's the robots have flown until the tick was due,
+        // however late it is: from poses of other times it would look as if they did not fly by their model.
         let own_time = link.clock.is_some();
-        let now = |fleet: &Fleet| if own_time { fleet.time() } else { system_time() };
+        let now = |fleet: &Fleet| if own_time { fleet.time() } else { system_time() - pace.lateness() };
         let pulse = pulse.clone();
         let _inside = pulse.as_ref().map(|pulse| pulse.inside());
         if let Some(parameters) = &mut link.parameters {

@@ -9,7 +9,7 @@ use crate::scene::swarm::Swarm;
 use crate::swarm::control::Control;
 use crate::swarm::flight::Fleet;
 use crate::swarm::pace::{Due, Pace, system_time};
-use crate::swarm::transport::{RobotsEnd, aim, fly};
+use crate::swarm::transport::{RobotsEnd, aim, catch_up, fly};
 
 /// The robots, and the end they speak through.
 pub struct SimulatedRobots {
@@ -61,7 +61,10 @@ impl SimulatedRobots {
             loop {
                 match self.pace.due() {
                     Due::In(rest) => return Duration::from_secs_f64(rest),
-                    Due::Now { .. } => self.tick(),
+                    Due::Now { missed } => {
+                        catch_up(&mut self.fleet, &self.goals, missed);
+                        self.tick();
+                    }
                 }
             }
         })
@@ -69,8 +72,9 @@ impl SimulatedRobots {
 
     /// One period: targets in, poses out.
     pub fn tick(&mut self) {
-        let Self { fleet, goals, end, .. } = self;
-        if let Err(error) = fly(fleet, goals, end, |_| system_time()) {
+        let Self { fleet, goals, end, pace, .. } = self;
+        // Until when they have flown, however late the tick is.
+        if let Err(error) = fly(fleet, goals, end, |_| system_time() - pace.lateness()) {
             tracing::debug!("{error}");
         }
         if self.fleet.period().is_multiple_of(CLEANING) {

@@ -59,6 +59,11 @@ impl Deadlines {
     pub fn missed(&self) -> u64 {
         self.missed
     }
+
+    /// Time at `now` since the tick that was begun last was due; 0 before there was one.
+    fn lateness(&self, now: f64) -> f64 {
+        self.tick.checked_sub(1).map_or(0.0, |tick| now - (self.start + tick as f64 * self.period))
+    }
 }
 
 /// The schedule of ticks on a clock of which a reading comes now and then: a simulator's. Pure.
@@ -136,6 +141,11 @@ impl Pace {
         }
     }
 
+    /// Time since the tick that was begun last was due \[s\].
+    pub fn lateness(&self) -> f64 {
+        self.deadlines.lateness(self.origin.elapsed().as_secs_f64())
+    }
+
     /// Sleeps until a tick is due by the clock that `read` reads \[s\], where it has a reading, and returns how many were
     /// missed before it; at most for a period of the computer's, and `None` where no tick is due by then: there is more to
     /// be done than ticks. Of a pace that follows no clock, [`Pace::wait`].
@@ -196,6 +206,12 @@ mod tests {
     fn a_long_tick_leaves_ticks_out_and_is_followed_by_no_burst() {
         let (begun, missed) = begun(10.0, 20, |tick| if tick == 4 { 0.55 } else { 0.01 }, 0.0);
         assert_eq!(missed, 4);
+        let mut one = Deadlines::new(1.0, 10.0);
+        assert_eq!(
+            (one.lateness(1.5), one.due(1.42), one.due(1.42)),
+            (0.0, Due::Now { missed: 4 }, Due::In(1.5 - 1.42))
+        );
+        assert!((one.lateness(1.47) - 0.07).abs() < 1e-12, "by the last that was due");
         for pair in begun.windows(2) {
             assert!(pair[1] - pair[0] > 0.04, "{pair:?}");
         }

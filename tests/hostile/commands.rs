@@ -19,6 +19,13 @@ fn limits_are_not_switched_off_from_the_command_line() {
         &["--set", "limits.acceleration=2.0", "--ros-args", "-p", "acceleration_limit:=0"],
         &["acceleration_limit", "the swarm file sets one"],
     );
+    // Targets are made for robots that brake as the file says.
+    let brakes =
+        ["--set", "flight.model={ kind = \"double-integrator\" }", "--set", "limits.acceleration=1.0"];
+    refused(
+        &[&brakes[..], &["--ros-args", "-p", "acceleration_limit:=0.9"]].concat(),
+        &["acceleration_limit", "change it in the swarm file"],
+    );
 }
 
 #[test]

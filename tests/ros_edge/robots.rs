@@ -1,15 +1,17 @@
 //! The nodes that the simulated robots are to others.
 
-use std::time::Duration;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
 
+use flockform::messages::geometry_msgs::PoseStamped;
 use flockform::messages::rcl_interfaces::{
     GetLoggerLevels, GetParameters, ListParameters, ListParametersRequest, Names,
 };
 use flockform::messages::type_description_interfaces::{GetTypeDescription, GetTypeDescriptionRequest};
 use flockform::ros::arguments::Severity;
-use flockform::ros::edge::Node;
 use flockform::ros::edge::loggers::LogLevel;
 use flockform::ros::edge::parameters::Value;
+use flockform::ros::edge::{Node, Quality};
 use flockform::ros::robots::{Layout, RobotNodes};
 use ros2_client::ServiceMapping;
 
@@ -38,6 +40,30 @@ fn robots_are_one_node_or_a_node_each() {
             (found == announced).then_some(())
         });
     }
+}
+
+/// Of robots that fly by their model poses of other times would be no poses of such robots.
+#[test]
+fn poses_bear_the_time_at_which_robots_are_there_however_late_the_computer_is() {
+    let peers = peers();
+    let watch = peers.theirs.node("/", "stopwatch").expect("a node");
+    let poses = watch.subscription::<PoseStamped>("/robot_1/pose", Quality::BEST_EFFORT).expect("hears");
+    let file = square(&["control.period=0.02"]);
+    let mut robots = RobotNodes::open(&file, &arguments(&[]), Layout::OneNode).expect("robots");
+    let mut stamps: Vec<f64> = Vec::new();
+    let begun = Instant::now();
+    robots.run_while(&AtomicBool::new(false), &mut |robots| {
+        stamps.extend(std::iter::from_fn(|| poses.take()).map(|(pose, _)| pose.header.stamp.seconds()));
+        // In some periods it begins late.
+        std::thread::sleep(Duration::from_millis(15 + 9 * (robots.fleet().period() % 3)));
+        stamps.len() < 60 && begun.elapsed() < PATIENCE
+    });
+    let off = |pair: &[f64]| {
+        let periods = (pair[1] - pair[0]) / 0.02;
+        (periods - periods.round()).abs()
+    };
+    let late = stamps.windows(2).filter(|pair| off(pair) > 0.05).count();
+    assert!(stamps.len() >= 60 && late <= 6, "{late} of {}: {stamps:?}", stamps.len());
 }
 
 /// Or `ros2 param list` waits five seconds for them.

@@ -261,6 +261,22 @@ const HEAD_ON: &str = "title = \"head on\"\nradius = 0.1\n\
     [[leaders]]\nrobots = [\"far\"]\nprogram = { kind = \"path\", points = [{ at = 4.0, displacement = [0.0, 1.0] }] }\n\
     [flight]\nduration = 5.0\n[flight.bounds]\nclearance = 0.4\n";
 
+/// Of which a period's way is less than what is called noise otherwise.
+#[test]
+fn unicycles_move_however_little_they_go_in_a_period() {
+    for (speed, period) in [(0.02, 0.05), (0.45, 0.002)] {
+        let text = format!(
+            "title = \"slow\"\nradius = 0.2\nlinks = {{ kind = \"nearest\", count = 1 }}\n\
+             robots = [{{ name = \"a\", place = [0.0, 0.0] }}, {{ name = \"b\", place = [0.0, 2.0] }}]\n\
+             leaders = [{{ robots = [\"a\"], program = {{ kind = \"path\", points = [{{ at = 1.0, displacement = [3.0, 0.0] }}] }} }}]\n\
+             limits = {{ speed = {speed:?}, clearance = 0.3 }}\ncontrol = {{ period = {period:?} }}\n\
+             flight = {{ duration = 4.0, model = {{ kind = \"unicycle\", turn_rate = 90.0 }}, record_every = 50 }}\n"
+        );
+        let (_, report) = flown(&parse(&text).expect("valid"));
+        assert!(report.per_robot[0].x > 0.8 * 4.0 * speed - 1.0 * speed, "{:?}", report.per_robot[0]);
+    }
+}
+
 #[test]
 fn a_broken_bound_names_the_robots_the_time_and_the_place() {
     let swarm = parse(HEAD_ON).expect("valid");

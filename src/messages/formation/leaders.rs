@@ -129,6 +129,7 @@ fn check_flyable(control: &Control, manoeuvre: &Manoeuvre, remedy: &str) -> Resu
 mod tests {
     use super::*;
     use crate::scene::bundled::bundled_swarm;
+    use crate::scene::swarm::Swarm;
 
     #[test]
     fn manoeuvres_of_the_bundled_swarms_can_be_asked_for_where_a_robot_can_fly_them() {
@@ -146,6 +147,51 @@ mod tests {
                 assert_eq!(begun.is_err(), is_step, "{}, {}: {begun:?}", one.name, manoeuvre.name);
             }
         }
+    }
+
+    #[test]
+    fn a_formation_that_was_led_by_other_means_moves_on_from_where_it_is() {
+        let text = "title = \"two\"\nradius = 0.2\nlinks = { kind = \"nearest\", count = 1 }\n\
+                    robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [0.0, 4.0] }]\n\
+                    leaders = [{ robots = [\"a\", \"b\"], program = { kind = \"external\" } }]\n\
+                    manoeuvres = [{ name = \"far\", about = [0.0, 0.0], legs = [{ seconds = 6.0, translate = [4.0, 0.0], rotate = 30.0 }] }]\n\
+                    limits = { speed = 1.0, clearance = 0.3 }\n";
+        let swarm =
+            Swarm::parse("two", "two.toml", text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+        let mut control = Control::new(&swarm).expect("laid out");
+        let led = [[5.0, 0.0], [5.0, 4.0]];
+        led.into_iter().enumerate().for_each(|(m, place)| assert!(control.place_leader(m, place)));
+        // Where the leaders of a formation about this point are at these times.
+        let places = |control: &Control, about: [f64; 2], time: f64| {
+            let map = control.formation().posture(about, time).affine(about);
+            [0, 1].map(|m| map.apply(control.formation().places.get(m)))
+        };
+        let stays = |control: &Control, led: [[f64; 2]; 2]| {
+            [[0.0, 2.0], [0.0, 0.0], [-3.0, 5.0]].into_iter().all(|about| {
+                let found = [0.0, 3.0, 10.0].map(|time| places(control, about, time));
+                found.iter().flat_map(|found| found.iter().zip(led)).all(|(a, b)| distance(*a, b) < 1e-9)
+            })
+        };
+        assert!(stays(&control, led), "led from outside");
+        let still = |translate: [f64; 2], rotate: f64| SetFormationRequest {
+            stretch: [1.0; 2],
+            translate,
+            rotate,
+            duration: 10.0,
+            ..SetFormationRequest::default()
+        };
+        set_formation(&mut control, &still([5.0, 0.0], 0.0)).expect("it is there already");
+        assert!(stays(&control, led), "on a manoeuvre that leads nowhere");
+        let far = SetFormationRequest { name: "far".into(), ..SetFormationRequest::default() };
+        set_formation(&mut control, &far).expect("can be flown");
+        let end = places(&control, [0.0, 0.0], 6.0);
+        // About the middle, (0, 2), which the turn about (0, 0) has carried to (3, 2 cos 30).
+        let turn = 30.0_f64.to_radians();
+        let there = places(&control, [0.0, 2.0], 6.0);
+        assert!(end.iter().zip(there).all(|(a, b)| distance(*a, b) < 1e-9), "{end:?} {there:?}");
+        let posture = control.formation().posture([0.0, 2.0], 6.0);
+        let translate = [4.0 - 2.0 * turn.sin(), 2.0 * turn.cos() - 2.0];
+        assert!(distance(posture.translate, translate) < 1e-12 && posture.rotate == turn, "{posture:?}");
     }
 
     #[test]

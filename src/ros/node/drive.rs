@@ -41,13 +41,8 @@ impl Drive {
         target: Option<[f64; 2]>,
         header: Header,
     ) -> Result<(), EdgeError> {
-        let twist = match (control.position(member), target, control.yaw(member)) {
-            (Some(here), Some(target), Some(yaw)) => {
-                let way = [target[0] - here[0], target[1] - here[1]];
-                twist(way, yaw, control.period(), control.limits().speed, self.turn_rate)
-            }
-            _ => Twist::default(),
-        };
+        let twist =
+            target.and_then(|target| towards(control, member, target, self.turn_rate)).unwrap_or_default();
         match &self.topic {
             Topic::Plain(topic) => topic.publish(&twist),
             Topic::Stamped(topic) => topic.publish(&TwistStamped { header, twist }),
@@ -55,10 +50,22 @@ impl Drive {
     }
 }
 
-/// The velocity that takes a robot along `way` \[m, world frame\] in a period \[s\].
-fn twist(way: [f64; 2], yaw: f64, period: f64, speed: f64, turn_rate: Option<f64>) -> Twist {
+/// The velocity towards a member's target \[m\]. That of a member that takes time to brake is where it comes to rest, far
+/// ahead of what it goes in a period.
+fn towards(control: &Control, member: usize, target: [f64; 2], turn_rate: Option<f64>) -> Option<Twist> {
+    let (here, period) = (control.position(member)?, control.period());
+    let braking = control.next_velocity(member, target);
+    let velocity = braking.unwrap_or([0, 1].map(|k| (target[k] - here[k]) / period));
+    Some(twist(velocity, control.yaw(member)?, period, control.limits().speed, turn_rate))
+}
+
+/// How far a robot that turns while it drives may leave the straight way in a period \[m\].
+const ASIDE: f64 = 1e-3;
+
+/// The command of a robot that is to go on with a velocity \[m/s, world frame\] for a period \[s\].
+fn twist(velocity: [f64; 2], yaw: f64, period: f64, speed: f64, turn_rate: Option<f64>) -> Twist {
     let (sin, cos) = yaw.sin_cos();
-    let ahead = [cos * way[0] + sin * way[1], cos * way[1] - sin * way[0]].map(|way| way / period);
+    let ahead = [cos * velocity[0] + sin * velocity[1], cos * velocity[1] - sin * velocity[0]];
     let mut twist = Twist::default();
     match turn_rate {
         None => {
@@ -67,10 +74,13 @@ fn twist(way: [f64; 2], yaw: f64, period: f64, speed: f64, turn_rate: Option<f64
             twist.linear = Vector3 { x: ahead[0] * scale, y: ahead[1] * scale, z: 0.0 };
         }
         Some(turn_rate) => {
-            let error = if way == [0.0; 2] { 0.0 } else { ahead[1].atan2(ahead[0]) };
+            let error = if velocity == [0.0; 2] { 0.0 } else { ahead[1].atan2(ahead[0]) };
             twist.angular.z = (error / period).clamp(-turn_rate, turn_rate);
-            // No faster than the heading allows: what lies to the side has to be turned to first.
-            twist.linear.x = ahead[0].clamp(0.0, speed);
+            // It keeps clear of others on the straight way alone: it turns first, and drives in a turn only as far as leads
+            // it hardly aside, by half the turn.
+            if error.abs() <= turn_rate * period {
+                twist.linear.x = ahead[0].clamp(0.0, speed).min(2.0 * ASIDE / (period * error.abs()));
+            }
         }
     }
     twist
@@ -81,21 +91,76 @@ mod tests {
     use std::f64::consts::FRAC_PI_2;
 
     use super::*;
+    use crate::scene::swarm::Swarm;
+    use crate::swarm::watch::Pose;
 
     #[test]
     fn velocities_are_in_the_robot_s_own_axes_and_within_its_limits() {
-        let Twist { linear, angular } = twist([0.0, 0.5], FRAC_PI_2, 0.1, 2.0, None);
+        let Twist { linear, angular } = twist([0.0, 5.0], FRAC_PI_2, 0.1, 2.0, None);
         assert!((linear.x - 2.0).abs() < 1e-12 && linear.y.abs() < 1e-12 && angular.z == 0.0, "{linear:?}");
-        let Twist { linear, .. } = twist([-0.05, 0.0], FRAC_PI_2, 0.1, 2.0, None);
+        let Twist { linear, .. } = twist([-0.5, 0.0], FRAC_PI_2, 0.1, 2.0, None);
         assert!((linear.y - 0.5).abs() < 1e-12 && linear.x.abs() < 1e-12, "{linear:?}");
     }
 
     #[test]
+    fn a_robot_that_takes_time_to_brake_is_driven_to_rest_before_a_fence_and_in_an_emergency_stop() {
+        let text = "title = \"drive\"\nradius = 0.2\nlinks = { kind = \"nearest\", count = 1 }\n\
+                    robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [0.0, 4.0] }]\n\
+                    leaders = [{ robots = [\"a\", \"b\"], program = { kind = \"path\", points = [{ at = 1.0, displacement = [6.0, 0.0] }] } }]\n\
+                    limits = { speed = 1.5, acceleration = 0.8, clearance = 0.3, geofence = [[-1.0, -1.0], [6.5, -1.0], [6.5, 5.0], [-1.0, 5.0]] }\n\
+                    control = { period = 0.05 }\nflight = { model = { kind = \"double-integrator\" } }\n";
+        let swarm =
+            Swarm::parse("drive", "drive.toml", text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+        for stop in [None, Some(60)] {
+            let mut control = Control::new(&swarm).expect("laid out");
+            let (mut x, mut v, mut most, mut fastest) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
+            for tick in 0..300 {
+                let now = 0.05 * f64::from(tick);
+                for (member, y) in [(0, 0.0), (1, 4.0)] {
+                    let pose = Pose { position: [x, y], yaw: 0.0, stamp: now, frame_is_right: true };
+                    control.receive(member, pose, now).expect("a pose");
+                }
+                if Some(tick) == stop {
+                    control.emergency_stop();
+                }
+                control.tick(now);
+                let target = control.target(0).expect("it is heard");
+                let twist = towards(&control, 0, target, None).expect("it is heard");
+                // Its base speeds up and brakes within its limit too.
+                let next = v + (twist.linear.x - v).clamp(-0.04, 0.04);
+                (x, v) = (x + 0.025 * (v + next), next);
+                (most, fastest) = (most.max(x), fastest.max(v));
+            }
+            let end = if stop.is_some() { 4.6 } else { 6.0 };
+            assert!(fastest > 1.4 && v.abs() < 1e-6 && most < end + 1e-6, "{stop:?}: {x}, {v}, {most}");
+            assert!(stop.is_some() || (x - 6.0).abs() < 1e-6, "{x}");
+        }
+    }
+
+    #[test]
     fn a_robot_that_cannot_go_sideways_turns_first() {
-        let Twist { linear, angular } = twist([0.0, 0.2], 0.0, 0.1, 2.0, Some(1.5));
-        assert_eq!((linear.y, angular.z), (0.0, 1.5));
-        assert!(linear.x.abs() < 1e-12);
+        // Of a quarter turn at once, and of what a period does not suffice for.
+        for yaw in [0.0, 1.2] {
+            let Twist { linear, angular } = twist([0.0, 2.0], yaw, 0.1, 2.0, Some(1.5));
+            assert_eq!((linear.x, linear.y, angular.z), (0.0, 0.0, 1.5));
+        }
+        let ahead = twist([2.0, 0.0], 0.0, 0.1, 1.5, Some(1.5));
+        assert_eq!((ahead.linear.x, ahead.angular.z), (1.5, 0.0));
         let still = twist([0.0; 2], 0.3, 0.1, 2.0, Some(1.5));
         assert_eq!(still, Twist::default());
+    }
+
+    #[test]
+    fn a_robot_that_turns_as_it_drives_stays_on_its_straight_way() {
+        for (yaw, turn_rate) in [(0.1, 1.5), (0.3, 4.0), (-0.14, 1.5), (0.01, 1.5)] {
+            let Twist { linear, angular } = twist([1.0, 0.0], yaw, 0.1, 2.0, Some(turn_rate));
+            let (mut y, mut heading, steps) = (0.0_f64, yaw, 1000);
+            for _ in 0..steps {
+                y += linear.x * heading.sin() * 0.1 / f64::from(steps);
+                heading += angular.z * 0.1 / f64::from(steps);
+            }
+            assert!(y.abs() < 1.01 * ASIDE && heading.abs() < 1e-9, "{yaw}: {y} m aside");
+            assert!(linear.x > 0.05, "it goes on: {linear:?}");
+        }
     }
 }

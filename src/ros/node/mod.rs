@@ -167,9 +167,7 @@ impl FormationNode {
             control,
         };
         this.settings.apply_all(this.parameters.iter(), &mut this.control, &mut this.pace);
-        if let Some(caution) = cautions::late_without_speed(this.control.limits()) {
-            tracing::warn!("{caution}");
-        }
+        cautions::of_real_robots(this.control.limits()).for_each(|caution| tracing::warn!("{caution}"));
         this.origin.take_names(&this.parameters);
         this.origin.check_topics()?;
         if this.settings.autostart {

@@ -58,6 +58,15 @@ pub(super) fn declare(
             .describe("formation states and markers a second, at most one a target [Hz]"),
         at_most("speed_limit", limits.speed).describe("highest speed of a robot [m/s]"),
         at_most("acceleration_limit", limits.acceleration)
+            .checked("of robots that brake by themselves as in the swarm file", {
+                let braking = (limits.brakes && limits.acceleration.is_finite()).then_some(limits.acceleration);
+                move |_, value| match braking.is_none_or(|own| value.as_double() == Some(own)) {
+                    true => Ok(()),
+                    false => Err("robots of the model \"double-integrator\" brake as limits.acceleration says, whatever is \
+                                  asked of them: change it in the swarm file, with the robots"
+                        .into()),
+                }
+            })
             .describe("highest acceleration of a robot [m/s^2]"),
         Declaration::new("clearance", limits.clearance)
             .range(limits.clearance..=limits.clearance.max(1000.0))

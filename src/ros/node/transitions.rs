@@ -2,7 +2,8 @@
 //!
 //! `configure` opens the formation: it takes the topics and the frame from the parameters, begins the loop anew and opens
 //! the topics of the robots. `cleanup` closes them; the loop keeps its state until the next `configure`. What stays
-//! throughout are the services, the parameters, `/diagnostics`, and the emergency stop, which outlasts every transition.
+//! throughout are the services, the parameters, `/diagnostics`, where robots were last heard to be, and the emergency stop,
+//! which outlasts every transition.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,7 +16,7 @@ use crate::messages::formation::diagnostics::Statistics;
 use crate::messages::recorder::MessageRecorder;
 use crate::ros::edge::lifecycle::{Goal, Lifecycle, Outcome};
 use crate::ros::edge::parameters::Parameters;
-use crate::swarm::control::{Control, Mode};
+use crate::swarm::control::Control;
 use crate::swarm::pace::Pace;
 
 /// The state that transitions change, beside the machine that asks for them.
@@ -90,14 +91,10 @@ impl Transitions<'_> {
         }
     }
 
-    /// The loop as it was before its first tick, but for an emergency stop and the parameters.
+    /// The loop as it was before its first tick, but for an emergency stop, the robots' last places and the parameters.
     fn begin_anew(&mut self) {
-        let is_stopped = self.control.mode() == Mode::EmergencyStopped;
-        self.control.clone_from(&self.origin.fresh);
+        self.control.begin_anew(&self.origin.fresh);
         self.control.set_active(false);
-        if is_stopped {
-            self.control.emergency_stop();
-        }
         self.settings.apply_all(self.parameters.iter(), self.control, self.pace);
     }
 

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::formation::{Formation, LeadSnapshot, Measures, Seen};
 use super::resilience::trim;
-use super::robots::DoubleIntegrator;
+use super::robots::{DoubleIntegrator, Robot};
 use super::safety::{self, Filter, Flags, Limits, SafetyError, Stray};
 use super::transport::Received;
 use super::watch::{Gains, Health, Pose, Range, Rejection, Track, Watch};
@@ -284,6 +284,15 @@ impl Control {
         DoubleIntegrator { speed, acceleration }
     }
 
+    /// The velocity \[m/s\] with which a member that takes time to brake ends the next period on its way to a target \[m\];
+    /// `None` of others.
+    pub fn next_velocity(&self, member: usize, target: [f64; 2]) -> Option<[f64; 2]> {
+        let [position, velocity] = [&self.tracked.present, &self.tracked.velocity].map(|of| of.get(member));
+        let mut robot = Robot { position, velocity, yaw: 0.0 };
+        self.dynamics().step(&mut robot, target, self.period);
+        self.brakes.then_some(robot.velocity)
+    }
+
     /// Gives a leader that is moved from outside its next place \[m\]; false if it is not one, or the place lies
     /// where no pose would be believed.
     pub fn place_leader(&mut self, member: usize, place: [f64; 2]) -> bool {
@@ -349,10 +358,30 @@ impl Control {
     pub fn restore(&mut self, kept: ControlSnapshot) {
         (self.run_before, self.run, self.periods) = (kept.program_time, 0, kept.periods);
         self.formation.restore(kept.leads, kept.periods);
-        let age = self.watch.limits().age_limit;
-        // They may have gone on to their last targets.
-        self.starts.iter_mut().zip(kept.places).for_each(|(start, place)| *start = Start { place, age });
+        for (member, place) in (0..self.starts.len()).zip(kept.places) {
+            self.leave_at(member, place);
+        }
         if kept.is_stopped {
+            self.emergency_stop();
+        }
+    }
+
+    /// Begins with a member at the place where an earlier loop left it; it may have gone on to its last target.
+    fn leave_at(&mut self, member: usize, place: [f64; 2]) {
+        self.starts[member] = Start { place, age: self.watch.limits().age_limit };
+    }
+
+    /// Begins anew as `fresh`, a loop of the same swarm before its first tick: what outlasts that is an emergency stop, and
+    /// where members were last heard to be.
+    pub fn begin_anew(&mut self, fresh: &Self) {
+        let earlier = std::mem::replace(self, fresh.clone());
+        for member in 0..earlier.starts.len() {
+            self.starts[member] = earlier.starts[member];
+            if let Some(place) = earlier.watch.place(member) {
+                self.leave_at(member, place);
+            }
+        }
+        if earlier.mode == Mode::EmergencyStopped {
             self.emergency_stop();
         }
     }

@@ -175,10 +175,11 @@ fn model(raw: &RawSwarm) -> Model {
         RawModel::Ideal => Model::Ideal,
         RawModel::Integrator => Model::Integrator(Integrator { speed }),
         RawModel::Unicycle { turn_rate } => {
-            // From rest, a target lies no farther than the acceleration leads in a period: to stand still there would be
-            // to stand for ever.
-            let from_rest = raw.limits.acceleration.unwrap_or(f64::INFINITY) * raw.control.period.powi(2);
-            let tolerance = Unicycle::default().tolerance.min(0.1 * from_rest);
+            // A target lies no farther than speed and, from rest, acceleration lead in a period: to stand still there would
+            // be to stand for ever.
+            let period = raw.control.period;
+            let from_rest = raw.limits.acceleration.unwrap_or(f64::INFINITY) * period.powi(2);
+            let tolerance = Unicycle::default().tolerance.min(0.1 * from_rest.min(speed * period));
             Model::Unicycle(Unicycle { speed, turn_rate: turn_rate.to_radians(), tolerance })
         }
         RawModel::DoubleIntegrator => Model::DoubleIntegrator(DoubleIntegrator {

@@ -98,7 +98,9 @@ impl Formation {
 
 #[cfg(test)]
 mod tests {
+    use crate::flock::vectors::distance;
     use crate::scene::bundled::bundled_swarm;
+    use crate::scene::swarm::Swarm;
     use crate::swarm::control::{Control, Mode};
     use crate::swarm::watch::Pose;
 
@@ -113,6 +115,36 @@ mod tests {
             }
             control.tick(now);
         }
+    }
+
+    /// It is no longer where the file has it.
+    #[test]
+    fn a_robot_that_has_fallen_silent_is_kept_clear_of_by_a_loop_that_begins_anew() {
+        let text = "title = \"three\"\nradius = 0.2\nlinks = { kind = \"listed\" }\n\
+                    robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [0.0, 4.0], neighbours = [\"c\"] }, \
+                    { name = \"c\", place = [0.0, 8.0] }]\nleaders = [{ robots = [\"a\", \"c\"], program = { kind = \"external\" } }]\n\
+                    limits = { speed = 1.0, clearance = 0.3 }\n";
+        let swarm =
+            Swarm::parse("three", "three.toml", text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+        let fresh = Control::new(&swarm).expect("valid");
+        let mut control = fresh.clone();
+        let mut places = [[0.0, 0.0], [3.0, 0.0], [0.0, 8.0]];
+        let mut nearest = f64::INFINITY;
+        for period in 0..600 {
+            let now = f64::from(period) * control.period();
+            if period == 20 {
+                control.begin_anew(&fresh);
+                assert!(control.place_leader(0, [6.0, 0.0]));
+            }
+            for m in [0, 1, 2].into_iter().filter(|&m| m != 1 || period < 20) {
+                let pose = Pose { position: places[m], yaw: 0.0, stamp: now, frame_is_right: true };
+                assert_eq!(control.receive(m, pose, now), Ok(()));
+            }
+            control.tick(now);
+            places[0] = control.target(0).expect("heard");
+            nearest = distance(places[0], places[1]).min(nearest);
+        }
+        assert!(nearest >= 0.7 - 1e-9 && places[0][0] > 0.5, "{nearest} m, {places:?}");
     }
 
     #[test]

@@ -225,15 +225,21 @@ impl Formation {
         Some(Manoeuvre { about, from: self.posture(about, now), legs: legs.clone() })
     }
 
-    /// The posture in which leaders on a manoeuvre about this point are.
+    /// The posture about this point in which leaders on a manoeuvre are, or nearest to where others are led.
     pub fn posture(&self, about: [f64; 2], now: f64) -> Posture {
         let under_way = self.leads.iter().flatten().find_map(|lead| match lead {
-            Lead::Manoeuvre { manoeuvre, since } if manoeuvre.about == about => {
-                Some(manoeuvre.posture(now - since))
+            Lead::Manoeuvre { manoeuvre, since } => {
+                Some(manoeuvre.posture(now - since).about(about, manoeuvre.about))
             }
             _ => None,
         });
-        under_way.unwrap_or(Posture::NOMINAL)
+        let led = || -> Vec<_> {
+            (0..self.count()).filter_map(|m| Some((self.places.get(m), self.led_to(m, now)?))).collect()
+        };
+        under_way.unwrap_or_else(|| match led() {
+            led if led.iter().all(|(place, to)| place == to) => Posture::NOMINAL,
+            led => Posture::fitted(about, &led),
+        })
     }
 
     /// The affine motion of the formation at `now`, where all its leaders follow one.

@@ -62,6 +62,72 @@ fn what_the_file_cannot_hold_is_warned_of() {
     assert!(!jittery.to_string().contains("no robot will get a target"), "{jittery}");
 }
 
+/// The cautions of two robots that lead, with these leaders' programs and more.
+fn cautions_of_two(programs: &str, more: &str) -> Vec<String> {
+    let text = format!(
+        "title = \"two\"\nradius = 0.2\nlinks = {{ kind = \"nearest\", count = 1 }}\n\
+         robots = [{{ name = \"a\", place = [-1.0, 0.0] }}, {{ name = \"b\", place = [1.0, 0.0] }}]\n\
+         leaders = [{{ robots = [\"a\", \"b\"], program = {{ {programs} }} }}]\nlimits = {{ speed = 20.0, clearance = 0.3 }}\n{more}"
+    );
+    let swarm = Swarm::parse("two", "two.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+    SwarmPlan::new(&swarm).expect("laid out").cautions
+}
+
+#[test]
+fn a_manoeuvre_is_warned_of_for_the_least_space_that_it_leaves_at_any_moment() {
+    let cautions = |leg: &str| {
+        cautions_of_two(
+            "kind = \"manoeuvre\", name = \"m\"",
+            &format!("manoeuvres = [{{ name = \"m\", legs = [{{ seconds = 60.0, {leg} }}] }}]\n"),
+        )
+    };
+    // Through each other between two of a few looks, and past each other.
+    for (leg, space) in [
+        ("stretch = [-12.0, 1.0]", "-0.400"),
+        ("stretch = [-0.83, 1.0], rotate = 90.0", "-0.400"),
+        ("stretch = [-1.0, 1.0], shear = [0.0, 0.5]", "0.085"),
+    ] {
+        let found = cautions(leg);
+        let words = format!("manoeuvre `m` leaves {space} m between `a` and `b`");
+        assert!(matches!(&found[..], [one] if one.contains(&words)), "{leg}: {found:?}");
+    }
+    assert_eq!(cautions("rotate = 170.0"), [""; 0]);
+}
+
+#[test]
+fn a_program_that_leaps_is_warned_of_whenever_it_does() {
+    for at in [2.0, 100.0] {
+        let path = |kind: &str| {
+            format!(
+                "kind = \"path\", interpolation = \"{kind}\", points = [{{ at = {at:?}, displacement = [5.0, 0.0] }}]"
+            )
+        };
+        let found = cautions_of_two(&path("hold"), "");
+        let words =
+            "the program of leaders[0] leaps by up to 5.000 m, farther than limits.speed leads in a period";
+        assert!(
+            matches!(&found[..], [one] if one.contains(words) && one.contains("\"linear\"")),
+            "{found:?}"
+        );
+        assert_eq!(cautions_of_two(&path("linear"), ""), [""; 0]);
+    }
+}
+
+#[test]
+fn a_robot_that_starts_where_no_pose_is_believed_is_warned_of() {
+    let start = |x: f64| {
+        let more = format!(
+            "poses = {{ range = 20.0 }}\nflight = {{ start = [{{ robot = \"a\", place = [{x:?}, 0.0] }}] }}\n"
+        );
+        cautions_of_two("kind = \"external\"", &more)
+    };
+    let found = start(30.0);
+    let words =
+        "start farther than poses.range = 20 m from the formation's middle, where no pose is believed: `a`";
+    assert!(matches!(&found[..], [one] if one.contains(words)), "{found:?}");
+    assert_eq!(start(-19.0), [""; 0]);
+}
+
 #[test]
 fn what_a_network_that_changes_and_commands_do_is_warned_of() {
     let channel = |noise: f64, delay: u32, loss: f64| {

@@ -135,7 +135,7 @@ pub fn shortened(way: [f64; 2], most: f64) -> [f64; 2] {
 }
 
 /// The point of a segment that is nearest to a place.
-pub(super) fn foot([a, b]: [[f64; 2]; 2], place: [f64; 2]) -> [f64; 2] {
+pub(in crate::swarm) fn foot([a, b]: [[f64; 2]; 2], place: [f64; 2]) -> [f64; 2] {
     let (along, way) = ([b[0] - a[0], b[1] - a[1]], [place[0] - a[0], place[1] - a[1]]);
     let square = dot(along, along);
     let share = if square > 0.0 { (dot(along, way) / square).clamp(0.0, 1.0) } else { 0.0 };

@@ -75,7 +75,8 @@
 //! A pose that disagrees with the model moves the hull, perhaps to where others are. Then one more border parts a
 //! member from each single place of the other's. The other's true place was in its hull before, so that the member is
 //! clear of that, and stays clear of it. Its velocity is then known only up to what the model could have made of it
-//! since the pose before, so that the ways of some such velocities count too. A member that does what its model cannot
+//! since the pose before, so that the ways of some such velocities count too. A pose that is farther off than any such member
+//! can be is inexact: the velocity is then corrected by no more than the model allows, and up to four times as much counts. A member that does what its model cannot
 //! is not covered, nor one that goes on, after a fault, from elsewhere than its targets were meant for, beyond its next
 //! pose.
 //!
@@ -120,6 +121,7 @@ mod obstacles;
 mod step;
 mod ways;
 
+pub(in crate::swarm) use cell::foot;
 pub use deadlock::Patience;
 pub use filter::{Filter, Flags, Seen, Stray};
 pub use limits::{Limits, Place, SafetyError};

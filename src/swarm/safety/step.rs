@@ -99,7 +99,8 @@ impl Filter {
             None => MotionRequest { way, distance, step, reach: distance.min(step) },
             Some(Motion { from, velocity }) => {
                 let (most, ahead) = (self.limits.acceleration, length(from));
-                let top = (length(velocity) + most * period).min(self.limits.speed);
+                // One whose limit has been lowered slows down.
+                let top = (length(velocity) + most * period).min(self.limits.speed.max(length(velocity)));
                 let reach = if self.crowd.brakes {
                     // To the end of the longest step, and of the braking after it.
                     0.5 * period * length(velocity) + self.braking().covered([top, 0.0], period)[0]

@@ -203,6 +203,13 @@ pub fn fly<E: RobotsEnd>(
     end.send(now, &poses).and(measured)
 }
 
+/// Lets simulated robots go on for periods that the computer left out, as robots do whose time is its.
+pub fn catch_up(fleet: &mut Fleet, goals: &[Option<[f64; 2]>], missed: u64) {
+    /// Those that slept for longer stand by then.
+    const MOST: u64 = 10_000;
+    (0..missed.min(MOST)).for_each(|_| fleet.go(|member| goals[member]));
+}
+
 /// Takes a target for a robot's goal \[m\]; one that is not finite, or of no robot, changes nothing.
 pub fn aim(goals: &mut [Option<[f64; 2]>], member: usize, place: [f64; 2]) {
     if place.iter().all(|value| value.is_finite())

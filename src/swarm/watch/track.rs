@@ -56,6 +56,8 @@ pub struct Track {
     /// Bound on the error of the velocity where the last pose disagreed with the model: what the robot has done since the
     /// one before is then not known \[m/s\].
     doubt: f64,
+    /// Whether one pose alone is known, which gives no velocity.
+    is_new: bool,
     /// Targets sent since, each with the time from which it holds \[s\].
     sent: VecDeque<(f64, Option<[f64; 2]>)>,
 }
@@ -68,6 +70,9 @@ const MOST_SENT: usize = 1024;
 const SURPRISE: f64 = 1e-6;
 const NOISE: f64 = 9.0;
 
+/// Bound on the error of a velocity behind poses that are inexact, in units of what the acceleration changes between two \[1\].
+const INEXACT: f64 = 4.0;
+
 /// Speed below which a robot is at rest, in units of what it takes up in a period \[1\].
 const AT_REST: f64 = 1e-12;
 
@@ -78,6 +83,7 @@ impl Default for Track {
             stamp: None,
             seen: [0.0; 2],
             doubt: 0.0,
+            is_new: true,
             sent: VecDeque::new(),
         }
     }
@@ -99,15 +105,24 @@ impl Track {
         }
         let is_surprise = off > SURPRISE * dynamics.acceleration * time * time + NOISE * deviation;
         let most = dynamics.acceleration * time;
+        // Poses that are farther off than any robot of this model can be are inexact, which the velocity then is too.
+        let most = if off > most * time + NOISE * deviation { INEXACT * most } else { most };
         // The errors before and after the pose add up to what it is off: they may cancel, and a half is left in the end.
         self.doubt = if is_surprise { most.min((2.0 * off / time).max(0.5 * self.doubt)) } else { 0.0 };
         let gains = Gains::of(dynamics.acceleration, period, deviation);
+        // No robot of this model has changed its velocity by more, unless nothing was known of it.
+        let change = gains.beta * off / time;
+        let share = if self.is_new { 1.0 } else { (2.0 * dynamics.acceleration * time / change).min(1.0) };
+        self.is_new = false;
+        let size = |[x, y]: [f64; 2]| x.hypot(y);
+        // One whose limit has been lowered is still faster for a while.
+        let most = dynamics.speed.max(size(self.robot.velocity));
         self.robot = expected;
         self.robot.position = [0, 1].map(|k| expected.position[k] + gains.alpha * surprise[k]);
-        self.robot.velocity = [0, 1].map(|k| expected.velocity[k] + gains.beta * surprise[k] / time);
-        let speed = self.robot.velocity[0].hypot(self.robot.velocity[1]);
-        if speed > dynamics.speed {
-            self.robot.velocity = self.robot.velocity.map(|v| v * dynamics.speed / speed);
+        self.robot.velocity = [0, 1].map(|k| expected.velocity[k] + share * gains.beta * surprise[k] / time);
+        let speed = size(self.robot.velocity);
+        if speed > most {
+            self.robot.velocity = self.robot.velocity.map(|v| v * most / speed);
         }
         self.begin(pose);
     }
@@ -199,7 +214,7 @@ impl Track {
         if self.stamp.is_some_and(|stamp| stamp > pose.stamp) {
             self.sent.clear();
         }
-        (self.robot, self.doubt) = (Robot::at(pose.position, pose.yaw), 0.0);
+        (self.robot, self.doubt, self.is_new) = (Robot::at(pose.position, pose.yaw), 0.0, true);
         self.begin(pose);
     }
 
@@ -331,6 +346,52 @@ mod tests {
                     robot.step(&Model::DoubleIntegrator(DYNAMICS), target.unwrap_or(robot.position), PERIOD);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_robot_whose_speed_limit_is_lowered_is_known_while_it_slows_down() {
+        let slow = DoubleIntegrator { speed: 0.3, ..DYNAMICS };
+        let (mut robot, mut track) = (Robot::at([0.0; 2], 0.0), Track::default());
+        for k in 0..80 {
+            let now = f64::from(k) * PERIOD;
+            let dynamics = if k < 50 { DYNAMICS } else { slow };
+            let pose = Pose { position: robot.position, yaw: 0.0, stamp: now, frame_is_right: true };
+            track.correct(&pose, &dynamics, PERIOD, 0.0);
+            let found = track.at(now, &dynamics, PERIOD, &mut Vec::new());
+            let off = distance(found.velocity, robot.velocity);
+            assert!(off <= DYNAMICS.acceleration * PERIOD, "{k}: {found:?}, {robot:?}");
+            // It is sent to where it comes to rest after it.
+            let before = robot;
+            robot.step(&Model::DoubleIntegrator(dynamics), [9.0, 0.0], PERIOD);
+            let way = dynamics.braking_way(robot.velocity, PERIOD);
+            let target = [0, 1].map(|axis| robot.position[axis] + way[axis]);
+            track.send(now, Some(target));
+            robot = before;
+            robot.step(&Model::DoubleIntegrator(DYNAMICS), target, PERIOD);
+        }
+        assert!(robot.velocity[0] < 0.31, "{robot:?}");
+    }
+
+    #[test]
+    fn the_velocity_behind_inexact_poses_is_off_by_no_more_than_its_doubt_allows_for() {
+        let even = |k: i32, step: f64| 2.0 * (f64::from(k) * step).fract() - 1.0;
+        // Up to twice as far off as the acceleration leads in a period.
+        for size in [0.0002, 0.001, 0.003] {
+            let (mut robot, mut track, mut late) = (Robot::at([0.0; 2], 0.0), Track::default(), 0);
+            for k in 0..400 {
+                let now = f64::from(k) * PERIOD;
+                let off = [size * even(k, 0.618_034), size * even(k, 0.414_214)];
+                let position = [0, 1].map(|axis| robot.position[axis] + off[axis]);
+                let pose = Pose { position, yaw: 0.0, stamp: now, frame_is_right: true };
+                track.correct(&pose, &DYNAMICS, PERIOD, 0.0);
+                let found = track.at(now, &DYNAMICS, PERIOD, &mut Vec::new());
+                late += i32::from(distance(found.velocity, robot.velocity) > track.doubt);
+                let target = [2.0 * (0.05 * f64::from(k)).sin(), 1.5 * (0.031 * f64::from(k)).cos()];
+                track.send(now, Some(target));
+                robot.step(&Model::DoubleIntegrator(DYNAMICS), target, PERIOD);
+            }
+            assert!(late < 20, "{size} m: {late} of 400");
         }
     }
 

@@ -4,15 +4,18 @@ mod network;
 
 use super::{ManoeuvreSpeed, needed};
 use crate::continuum::late::beyond;
+use crate::flock::block::apply;
 use crate::flock::manoeuvre::Manoeuvre;
-use crate::flock::motion::{Keyframe, Motion};
+use crate::flock::motion::{Interpolation, Keyframe, Motion};
 use crate::flock::vectors::distance;
+use crate::geometry::point::minus;
 use crate::scene::swarm::raw::{RawCommandKind, RawSwarm};
 use crate::scene::swarm::{Program, Swarm};
 use crate::scene::text::{decimals, number};
 use crate::swarm::flight::Flight;
 use crate::swarm::formation::Formation;
-pub use network::late_without_speed;
+use crate::swarm::safety::foot;
+pub use network::{late_without_speed, of_real_robots};
 
 /// Parts of a leg or of a program between which a leader's way is looked at.
 const PARTS: usize = 40;
@@ -34,12 +37,13 @@ pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
             .then(|| outside(flight, "have their places in the formation", &|m| formation.places.get(m)))
             .flatten(),
         near_at_the_start(flight, raw),
+        out_of_range_at_the_start(flight, raw),
         led_outside(flight),
         led_out_of_range(flight, raw),
         in_solids(flight),
         led_into_solids(flight),
     ];
-    let fast = fast_manoeuvres(raw, formation).chain(fast_paths(swarm));
+    let fast = fast_manoeuvres(raw, formation).chain(fast_paths(swarm)).chain(leaping_paths(swarm));
     let commanded = commanded_astray(raw, flight);
     network::of(raw, flight)
         .into_iter()
@@ -116,6 +120,17 @@ fn near_at_the_start(flight: &Flight, raw: &RawSwarm) -> Option<String> {
     let names = formation.named(is_beside_another)?;
     Some(format!(
         "these robots start nearer to another than limits.clearance: {names}; move them, or lower it"
+    ))
+}
+
+/// Robots that begin where no pose is believed.
+fn out_of_range_at_the_start(flight: &Flight, raw: &RawSwarm) -> Option<String> {
+    let (control, robots) = (flight.control(), flight.fleet().robots());
+    let names = control.formation().named(|m| !control.is_believed(robots[m].position))?;
+    Some(format!(
+        "these robots start farther than poses.range = {} m from the formation's middle, where no pose is believed: {names}; \
+         raise it, or move them",
+        number(raw.poses.range)
     ))
 }
 
@@ -207,11 +222,7 @@ fn fast_manoeuvres(raw: &RawSwarm, formation: &Formation) -> impl Iterator<Item 
 fn fast_paths(swarm: &Swarm) -> impl Iterator<Item = String> {
     let limit = swarm.raw.limits.speed.unwrap_or(f64::INFINITY);
     swarm.leaders.iter().enumerate().filter_map(move |(k, leaders)| {
-        let fastest = match &leaders.program {
-            Program::Motion(motion) => speed(motion),
-            Program::Individual(tracks) => tracks.iter().map(|(_, motion)| speed(motion)).fold(0.0, f64::max),
-            Program::External | Program::Manoeuvre(_) => 0.0,
-        };
+        let fastest = motions(&leaders.program).map(speed).fold(0.0, f64::max);
         (fastest > limit * (1.0 + ROUNDING)).then(|| {
             format!(
                 "the program of leaders[{k}] moves a robot at up to {} m/s, above limits.speed: it will fall \
@@ -222,9 +233,45 @@ fn fast_paths(swarm: &Swarm) -> impl Iterator<Item = String> {
     })
 }
 
-/// Largest speed of a program by keyframes \[m/s\].
+/// Programs that leap from one point to the next.
+fn leaping_paths(swarm: &Swarm) -> impl Iterator<Item = String> {
+    let reach = swarm.raw.limits.speed.unwrap_or(f64::INFINITY) * swarm.raw.control.period;
+    swarm.leaders.iter().enumerate().filter_map(move |(k, leaders)| {
+        let farthest = motions(&leaders.program).map(leap).fold(0.0, f64::max);
+        (farthest > reach * (1.0 + ROUNDING)).then(|| {
+            format!(
+                "the program of leaders[{k}] leaps by up to {} m, farther than limits.speed leads in a period: the robot \
+                 will be on its way for a while; interpolate it \"linear\" or \"smooth\"",
+                decimals(farthest, 3)
+            )
+        })
+    })
+}
+
+/// Those of a program by points.
+fn motions(program: &Program) -> impl Iterator<Item = &Motion> {
+    let (one, several) = match program {
+        Program::Motion(motion) => (Some(motion), &[][..]),
+        Program::Individual(tracks) => (None, &tracks[..]),
+        Program::External | Program::Manoeuvre(_) => (None, &[][..]),
+    };
+    one.into_iter().chain(several.iter().map(|(_, motion)| motion))
+}
+
+/// Largest leap of a program that holds each of its points until the next \[m\].
+fn leap(motion: &Motion) -> f64 {
+    let Motion::Keyframes { frames, interpolation: Interpolation::Hold } = motion else { return 0.0 };
+    let ends = frames.iter().map(|frame| frame.displacement);
+    let begins = std::iter::once([0.0; 2]).chain(ends.clone());
+    begins.zip(ends).map(|(from, to)| distance(from, to)).fold(0.0, f64::max)
+}
+
+/// Largest speed of a program by keyframes that goes from one to the next \[m/s\].
 fn speed(motion: &Motion) -> f64 {
-    let Motion::Keyframes { frames, .. } = motion else { return 0.0 };
+    let Motion::Keyframes { frames, interpolation: Interpolation::Linear | Interpolation::Smooth } = motion
+    else {
+        return 0.0;
+    };
     let times: Vec<f64> =
         std::iter::once(0.0).chain(frames.iter().map(|Keyframe { step, .. }| *step)).collect();
     let segment = |pair: &[f64]| {
@@ -255,24 +302,26 @@ fn narrow(raw: &RawSwarm, formation: &Formation) -> impl Iterator<Item = String>
 }
 
 /// Least free space between two robots at their places in a manoeuvre \[m\], and which two.
+///
+/// A turn leaves their distance, and stretch and shear are linear in the part of a leg that is done: so is the way from the
+/// one to the other before the turn.
 fn narrowest(formation: &Formation, manoeuvre: &Manoeuvre) -> Option<(f64, usize, usize)> {
-    const INSTANTS: usize = 10;
     let mut least: Option<(f64, usize, usize)> = None;
-    let mut start = 0.0;
+    let mut from = manoeuvre.from.shape();
     for leg in &manoeuvre.legs {
-        for k in 1..=INSTANTS {
-            let map = manoeuvre.affine(start + leg.seconds * k as f64 / INSTANTS as f64);
-            let places: Vec<[f64; 2]> = formation.places.iter().map(|place| map.apply(place)).collect();
-            for i in 0..places.len() {
-                for j in 0..i {
-                    let free = distance(places[i], places[j]) - formation.radii[i] - formation.radii[j];
-                    if least.is_none_or(|(other, ..)| free < other) {
-                        least = Some((free, j, i));
-                    }
+        let to = leg.posture.shape();
+        for i in 0..formation.count() {
+            for j in 0..i {
+                let way = minus(formation.places.get(i), formation.places.get(j));
+                let [begin, end] = [&from, &to].map(|shape| apply(shape, way));
+                let nearest = foot([begin, end], [0.0; 2]);
+                let free = distance(nearest, [0.0; 2]) - formation.radii[i] - formation.radii[j];
+                if least.is_none_or(|(other, ..)| free < other) {
+                    least = Some((free, j, i));
                 }
             }
         }
-        start += leg.seconds + leg.hold;
+        from = to;
     }
     least
 }

@@ -107,6 +107,19 @@ pub fn late_without_speed(limits: &Limits) -> Option<&'static str> {
     )
 }
 
+/// Cautions where nodes fly robots, whose poses are late and inexact.
+pub fn of_real_robots(limits: &Limits) -> impl Iterator<Item = &'static str> {
+    late_without_speed(limits).into_iter().chain(exact_poses(limits))
+}
+
+/// The velocity of a robot that takes time to brake follows from its poses.
+fn exact_poses(limits: &Limits) -> Option<&'static str> {
+    (limits.brakes && limits.acceleration.is_finite() && limits.deviation == 0.0).then_some(
+        "flight.noise = 0 says that poses are exact, and those of real robots are not: where the model \"double-integrator\" \
+         flies them, give flight.noise the standard deviation of their poses",
+    )
+}
+
 /// Robots that move on unheard, at any speed.
 fn silent(raw: &RawSwarm, flight: &Flight) -> Option<String> {
     use RawFaultKind::{NotANumber, Silent, WrongFrame};
