@@ -36,7 +36,7 @@ fn bits(flight: &Flight) -> Vec<[u64; 2]> {
 }
 
 fn assert_replays(swarm: &Live) {
-    let text = swarm.saved().expect("can be written");
+    let text = swarm.saved(None).expect("can be written");
     let file = Swarm::parse("saved", "saved.toml", &text, &[], None)
         .unwrap_or_else(|error| panic!("{error}\n{text}"));
     let mut again = Flight::new(&file).unwrap_or_else(|error| panic!("{error}"));
