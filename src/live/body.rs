@@ -172,7 +172,9 @@ impl Session for Body {
 
     fn saved(&self, folder: Option<&Path>) -> Result<String, String> {
         let (mut raw, from) = (self.history.now.replay(), self.history.source.folder.as_deref());
-        folder.iter().for_each(|to| raw.name_files_from(from, to));
+        if let Some(to) = folder {
+            raw.name_files_from(from, to);
+        }
         let text = toml::to_string(&raw).map_err(|error| error.to_string())?;
         match Scene::parse("saved", "saved.toml", &text, &[], folder.or(from)) {
             Ok(_) => Ok(text),

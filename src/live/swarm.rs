@@ -243,7 +243,9 @@ impl Session for Swarm {
 
     fn saved(&self, folder: Option<&Path>) -> Result<String, String> {
         let mut raw = self.history.now.file.raw.clone();
-        folder.iter().for_each(|to| raw.name_files_from(self.history.source.folder.as_deref(), to));
+        if let Some(to) = folder {
+            raw.name_files_from(self.history.source.folder.as_deref(), to);
+        }
         // Before a period the hand acted first: the file's own commands are performed when it begins.
         let own = std::mem::replace(&mut raw.flight.commands, self.history.now.commands.clone());
         raw.flight.commands.extend(own);
