@@ -103,6 +103,9 @@ fn over_relaxation_and_sequential_sweeps_have_their_textbook_thresholds() {
     let [lower, _] = threshold(&relaxed, Parameter::Feedback, Side::Lower);
     assert!((lower + 1.0).abs() < 1e-6, "{lower}");
     threshold(&relaxed, Parameter::Feedback, Side::Upper);
+    // A frame that lags has a spectrum of its own beside that of the body, which stands still there.
+    let [lower, _] = threshold(&linear("feedback-overrelax", &[]), Parameter::Feedback, Side::Lower);
+    assert!((lower + 1.0).abs() < 1e-6, "{lower}");
     // Gauss-Seidel of a symmetric positive system converges up to 2 (A. M. Ostrowski, 1954).
     let sequential = linear("tension", &["frame=none", NO_PROBES, "update.order=\"sequential\""]);
     for found in threshold(&sequential, Parameter::Damping, Side::Upper) {

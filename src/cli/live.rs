@@ -90,7 +90,7 @@ pub fn live(arguments: &LiveArguments) -> Result<ExitCode, Refusal> {
 
 /// Records what was done: the messages of a run of the file that replays it. What was undone is not in it.
 fn record(session: &dyn Session, recording: &Shared, folder: Option<&Path>) -> Result<(), Refusal> {
-    let text = session.saved().map_err(Refusal::LiveRecord)?;
+    let text = session.saved(None).map_err(Refusal::LiveRecord)?;
     let (name, _) = session.title();
     if session.is_body() {
         let scene = Scene::parse(name, "the session", &text, &[], folder)?;

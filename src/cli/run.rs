@@ -47,7 +47,7 @@ use super::{FAILED, Refusal, exit_code, interrupt, memory, on_terminal};
 #[derive(Debug, Args)]
 #[command(mut_arg("set", |set| set.requires("scene")))]
 pub struct RunArguments {
-    /// Name of a bundled scene (see `flockform list scenes`) or path of a scene file; not with --resume
+    /// Name of a bundled scene (see `flockform list scenes`) or path of a scene file; left out with --resume; if given, it must be the scene that was run
     #[arg(required_unless_present = "resume", value_parser = FileName::SCENE, hide_possible_values = true)]
     scene: Option<String>,
     #[command(flatten)]

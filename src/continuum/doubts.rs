@@ -86,5 +86,9 @@ pub(crate) fn seen(scene: &Scene, engine: &Engine) -> Vec<String> {
     let Doubts { followers, unmoved, long } =
         Doubts::of(engine.body(), engine.flock(), engine.roles(), engine.present());
     let [followers, unmoved, long] = [followers, unmoved, long].map(|own| engine.count_of_parts(own));
-    Doubts { followers, unmoved, long }.cautions(scene)
+    let mut cautions = Doubts { followers, unmoved, long }.cautions(scene);
+    if engine.body().part.is_none() {
+        cautions.extend(layout::roles::cautions(engine.changes(), engine.body().count()));
+    }
+    cautions
 }

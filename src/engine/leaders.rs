@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Engine;
 use super::setup::RoleChange;
+use super::{Before, Engine};
 use crate::flock::condition::Quantity;
 use crate::flock::vectors::distance;
 
@@ -29,11 +29,15 @@ impl Led {
 }
 
 impl Engine {
-    pub(super) fn take_roles(&mut self) {
+    /// Takes the roles of this step; `before` it, where that is to be noted.
+    pub(super) fn take_roles(&mut self, mut before: Option<&mut Before>) {
         let mut changed = false;
         for change in 0..self.changes.len() {
             // The ranks that have no particle of it compile their sweeps with the others.
             let Some(taking) = self.taking(change) else { continue };
+            if let Some(before) = before.take() {
+                before.note_all(self);
+            }
             for &which in &taking {
                 let particle = self.changes[change].particles[which];
                 self.roles[particle] = self.changes[change].role;

@@ -5,7 +5,7 @@
 //! taken at once ([`several`]). An [`observer::Observer`] looks at it on its way. Several ranks can share a body
 //! ([`shared`]). [`forces`] are those within a body
 //! that is a material, and what holds it; [`path`] sums up the work done between equilibria. [`state`] takes an engine
-//! out on its way and puts it back, for checkpoints.
+//! out on its way and puts it back, for checkpoints; `undo` takes a step back that diverged.
 
 mod actions;
 pub mod forces;
@@ -20,6 +20,7 @@ pub mod setup;
 pub mod several;
 pub mod shared;
 pub mod state;
+mod undo;
 
 use std::sync::Arc;
 
@@ -46,6 +47,7 @@ use movement::Movement;
 use path::Path;
 use probes::ProbeSeries;
 use setup::{Conduct, RoleChange, Setup};
+pub(crate) use undo::Before;
 
 /// A body on its way; positions in \[length, world frame\], shape \[count\].
 #[derive(Clone, Debug)]
@@ -283,16 +285,23 @@ impl Engine {
 
     /// Moves the body by one step.
     pub fn advance(&mut self) {
+        self.advance_from(None);
+    }
+
+    fn advance_from(&mut self, mut before: Option<&mut Before>) {
         if self.steps_at_once(1) == 1 {
             self.advance_by(1, None);
             return;
         }
         self.gather();
+        if let Some(before) = before.as_deref_mut().filter(|_| self.acts_next()) {
+            before.note_all(self);
+        }
         self.step += 1;
         self.settled = None;
         self.act();
         self.follow_ramp();
-        self.take_roles();
+        self.take_roles(before);
         self.break_bonds();
         self.find_present_neighbours();
         if self.update.order == Order::Sequential {
@@ -368,11 +377,6 @@ impl Engine {
     /// The equilibria that it has come through; `None` for a body that is stepped, or put to rest at once.
     pub fn path(&self) -> Option<&Path> {
         self.path.as_ref()
-    }
-
-    /// Takes the last step back: positions as before it. A shared body must have been [gathered](Engine::gather). Bonds that broke in it stay broken.
-    pub(crate) fn undo_step(&mut self) {
-        self.return_to(self.step - 1, &self.previous.clone(), self.activity.clone());
     }
 
     /// Whether a role change or a leader's motion is still to come, so that rest is no equilibrium.

@@ -1,9 +1,9 @@
 //! Several steps of a body at once, where nothing in between depends on how it stands.
 
-use super::Engine;
 use super::leaders::Led as Leader;
 use super::movement::Movement;
 use super::shared::take_steps;
+use super::{Before, Engine};
 use crate::engine::setup::RoleChange;
 use crate::flock::law::Flock;
 use crate::flock::vectors::{Vectors, distance};
@@ -18,8 +18,9 @@ pub struct StepBatch {
     bound: f64,
     /// How far a step takes particles from the reference, if that is known.
     reach: Option<Reach>,
-    /// Where a batch began, if it may have gone too far, or the positions before those from which a step may diverge.
-    start: Vectors,
+    /// The engine before the last step, if that may have diverged; the places where a batch began, if it may have gone too far.
+    before: Before,
+    is_noted: bool,
     /// Steps to be taken one at a time.
     single_steps: usize,
 }
@@ -30,7 +31,8 @@ impl StepBatch {
     pub fn new(engine: &Engine, tolerance: Option<f64>, bound: f64) -> Self {
         let reach = if engine.steps_at_once(1) > 0 { engine.reach_of_a_step() } else { None };
         let displacement = engine.movement().largest_displacement;
-        Self { tolerance, displacement, bound, reach, start: Vectors::default(), single_steps: 0 }
+        let before = Before::default();
+        Self { tolerance, displacement, bound, reach, before, is_noted: false, single_steps: 0 }
     }
 
     /// The step until which nothing looks at the body: the least over `look`, the next one that an observer looks at,
@@ -50,38 +52,44 @@ impl StepBatch {
         farthest * std::f64::consts::SQRT_2 * (1.0 + 1e-9) > self.bound
     }
 
-    /// Takes the last step back, which diverged: the positions before the one that is then the last are known again.
-    pub fn undo(&self, engine: &mut Engine) {
-        engine.undo_step();
-        if self.start.len() == engine.previous.len() {
-            engine.previous.clone_from(&self.start);
+    /// Takes the last step back, which diverged.
+    pub fn undo(&mut self, engine: &mut Engine) {
+        if self.is_noted {
+            engine.undo_step(&mut self.before);
+        } else {
+            // Nothing but positions that are no numbers: those of leaders whose motion is not known there.
+            engine.return_to(engine.step - 1, &engine.previous.clone(), engine.activity.clone());
         }
     }
 
     /// Takes at least one step, and none beyond `look`; returns how the last one moved the body.
     pub fn advance(&mut self, engine: &mut Engine, look: usize) -> Movement {
         let (step, until) = (engine.step(), self.quiet_until(engine, look));
+        self.is_noted = false;
+        self.before.forget_engine();
         if until < step + 2 {
             self.single_steps = self.single_steps.saturating_sub(1);
             let acts = engine.acts_next();
             let may_diverge = |reach| self.may_diverge(engine, reach, 1);
-            if engine.steps_at_once(1) == 0 || self.reach.is_none_or(may_diverge) {
+            self.is_noted = engine.steps_at_once(1) == 0 || self.reach.is_none_or(may_diverge);
+            if self.is_noted {
                 engine.gather();
-                self.start.clone_from(&engine.previous);
+                engine.advance_noting(&mut self.before);
+            } else {
+                engine.advance();
             }
-            engine.advance();
             // Another rule takes particles another distance.
             if acts && self.reach.is_some() {
                 self.reach = engine.reach_of_a_step();
             }
         } else if let Some(tolerance) = self.tolerance {
             let activity = engine.activity.clone();
-            self.start.clone_from(&engine.present);
+            self.before.places.clone_from(&engine.present);
             let farther = tolerance * engine.body.lattice.spacing() * (1.0 + 1e-9);
             let moved = engine.advance_by(until - step, Some(farther));
             // The last one is looked at.
             if moved[..moved.len() - 1].contains(&false) {
-                engine.return_to(step, &self.start, activity);
+                engine.return_to(step, &self.before.places, activity);
                 self.single_steps = moved.len() - 1;
                 engine.advance();
             }

@@ -217,7 +217,7 @@ impl<'a> EngineState<'a> {
         engine.guided = self.guided.into_owned();
         engine.breaks = self.breaks.into_owned();
         if let (Some(bonds), Some(broken)) = (&mut engine.flock.bonds, &self.broken) {
-            bonds.set_broken(|bond| broken[bond / 8] >> (bond % 8) & 1 == 1);
+            bonds.set_broken(|bond| is_set(broken, bond));
         }
         engine.rebuild_caches();
         engine.activity = self.activity;
@@ -261,7 +261,7 @@ impl<'a> EngineState<'a> {
 }
 
 /// Whether each bond is of one of these pairs, eight to a byte.
-fn bits_of(breaks: &[Break], first: usize, neighbours: &Neighbours) -> Vec<u8> {
+pub(super) fn bits_of(breaks: &[Break], first: usize, neighbours: &Neighbours) -> Vec<u8> {
     let pairs: HashSet<[u32; 2]> = breaks.iter().map(|one| one.pair).collect();
     let mut bits = vec![0; neighbours.index.len().div_ceil(8)];
     for j in (0..neighbours.count()).filter(|_| !pairs.is_empty()) {
@@ -273,17 +273,28 @@ fn bits_of(breaks: &[Break], first: usize, neighbours: &Neighbours) -> Vec<u8> {
     bits
 }
 
+/// One of bits that are eight to a byte.
+pub(super) fn is_set(bits: &[u8], bit: usize) -> bool {
+    bits[bit / 8] >> (bit % 8) & 1 == 1
+}
+
 impl Engine {
     /// Finds again what follows from roles, bonds and positions that were put in from outside.
     fn rebuild_caches(&mut self) {
         if let Some(present) = &mut self.present_neighbours {
             present.members = self.roles.iter().map(|role| role.is_body()).collect();
-            if self.step > 0 {
-                // Those of a step are found where it begins.
-                let super::PresentNeighbours { radius, grid, members } = present;
-                self.flock.neighbours.rebuild_within(grid, &self.previous, members, *radius);
-            }
         }
+        self.find_neighbours_of_last_step();
         self.compile_sweep();
+    }
+
+    /// Finds the neighbours that the last step found, where it began.
+    pub(super) fn find_neighbours_of_last_step(&mut self) {
+        let Some(super::PresentNeighbours { radius, grid, members }) = &mut self.present_neighbours else {
+            return;
+        };
+        if self.step > 0 {
+            self.flock.neighbours.rebuild_within(grid, &self.previous, members, *radius);
+        }
     }
 }

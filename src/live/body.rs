@@ -3,7 +3,7 @@
 mod load;
 mod state;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde_json::{Value, json};
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use super::command::Command;
 use super::history::{History, Source};
 use super::session::{Broken, Frame, Refused, Session, Viewer};
-use crate::engine::Engine;
+use crate::engine::{Before, Engine};
 use crate::export::report::RunRecorder;
 use crate::export::report::view::View;
 use crate::flock::action::{Action, ActionKind};
@@ -27,6 +27,8 @@ const FARTHEST: f64 = 20.0;
 /// A body under way, and everything that was done to it.
 pub struct Body {
     history: History<State>,
+    /// The engine before the last step.
+    before: Before,
 }
 
 impl Body {
@@ -35,7 +37,7 @@ impl Body {
     /// # Errors
     /// Names the key of a scene that cannot be laid out, or that is too large to be shown.
     pub fn new(scene: Scene, folder: Option<PathBuf>) -> Result<Self, SceneError> {
-        Ok(Self { history: History::new(scene, folder)? })
+        Ok(Self { history: History::new(scene, folder)?, before: Before::default() })
     }
 
     /// The body as it is.
@@ -138,11 +140,11 @@ impl Session for Body {
     fn advance(&mut self) -> Result<(), String> {
         self.lead();
         let state = &mut self.history.now;
-        state.engine.advance();
+        state.engine.advance_noting(&mut self.before);
         match state.bounds.divergence(&state.engine) {
             None => Ok(()),
             Some(divergence) => {
-                state.engine.undo_step();
+                state.engine.undo_step(&mut self.before);
                 Err(divergence.to_string())
             }
         }
@@ -168,10 +170,13 @@ impl Session for Body {
         self.history.now.let_go(viewer);
     }
 
-    fn saved(&self) -> Result<String, String> {
-        let raw = self.history.now.replay();
+    fn saved(&self, folder: Option<&Path>) -> Result<String, String> {
+        let (mut raw, from) = (self.history.now.replay(), self.history.source.folder.as_deref());
+        if let Some(to) = folder {
+            raw.name_files_from(from, to);
+        }
         let text = toml::to_string(&raw).map_err(|error| error.to_string())?;
-        match Scene::parse("saved", "saved.toml", &text, &[], self.history.source.folder.as_deref()) {
+        match Scene::parse("saved", "saved.toml", &text, &[], folder.or(from)) {
             Ok(_) => Ok(text),
             Err(error) => Err(format!("no run would take this file yet: {error}")),
         }

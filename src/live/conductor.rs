@@ -243,7 +243,7 @@ impl Conductor {
     }
 
     fn save(&self, viewer: Viewer) {
-        let said = match self.session.saved().and_then(|text| self.write(&text)) {
+        let said = match self.session.saved(Some(&self.folder)).and_then(|text| self.write(&text)) {
             Ok(path) => {
                 let command = format!("flockform {} {}", self.session.runner(), path.display());
                 json!({ "event": "saved", "path": path, "command": command })

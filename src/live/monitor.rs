@@ -4,6 +4,7 @@
 //! otherwise: without a viewer nothing is copied. Commands go to the loop over the [`CommandLink`] that the program
 //! gives, and the loop's answers come back over it.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -144,7 +145,7 @@ impl Session for Monitor {
         (link.send)(viewer, command)
     }
 
-    fn saved(&self) -> Result<String, String> {
+    fn saved(&self, _folder: Option<&Path>) -> Result<String, String> {
         Err("what a node flies is kept by --record".into())
     }
 

@@ -1,5 +1,7 @@
 //! The session that viewers share: a body or a swarm, and what they have done with it.
 
+use std::path::Path;
+
 use serde_json::Value;
 
 use super::command::Command;
@@ -73,11 +75,12 @@ pub trait Session: Send {
     /// Lets go of what a viewer holds, if it holds anything.
     fn release(&mut self, _viewer: Viewer) {}
 
-    /// The file that replays what was done, as TOML.
+    /// The file that replays what was done, as TOML; it names other files as they are found from `folder`, without one
+    /// as the file does that the session began with.
     ///
     /// # Errors
     /// Why it cannot be written, or that nothing would take it.
-    fn saved(&self) -> Result<String, String>;
+    fn saved(&self, folder: Option<&Path>) -> Result<String, String>;
 
     /// The state of every particle, of a body with those channels alone that are wanted.
     fn frame(&self, wanted: &[bool]) -> Frame;

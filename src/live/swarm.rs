@@ -2,7 +2,7 @@
 //! flies it again.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde_json::Value;
@@ -241,8 +241,11 @@ impl Session for Swarm {
         self.history.now.hands.remove(&viewer);
     }
 
-    fn saved(&self) -> Result<String, String> {
+    fn saved(&self, folder: Option<&Path>) -> Result<String, String> {
         let mut raw = self.history.now.file.raw.clone();
+        if let Some(to) = folder {
+            raw.name_files_from(self.history.source.folder.as_deref(), to);
+        }
         // Before a period the hand acted first: the file's own commands are performed when it begins.
         let own = std::mem::replace(&mut raw.flight.commands, self.history.now.commands.clone());
         raw.flight.commands.extend(own);

@@ -14,11 +14,12 @@ use super::errors::{as_dict, diverged};
 use super::run::{interrupt_by, positive, words};
 use super::source::Source;
 use super::threads::{Threads, here};
-use crate::continuum::equilibrium::{run_to_equilibrium, solve_equilibrium};
+use crate::continuum::equilibrium::{run_to_equilibrium_watched, solve_equilibrium};
 use crate::continuum::mechanics::{Mechanics, Stresses};
 use crate::continuum::run::{Divergence, Outcome, StopReason, overflow};
 use crate::engine::Engine;
 use crate::engine::forces::Forces;
+use crate::engine::observer::EachStep;
 use crate::flock::role::Role;
 use crate::scene::{Scene, SceneError};
 use crate::solve::equilibrium::Request;
@@ -216,7 +217,8 @@ impl Body {
             interrupt_by(&mut scene, progress);
             let plan = plan(&scene)?;
             if scene.equilibrium.is_some() {
-                return run_to_equilibrium(&scene, plan, &mut |_, _| std::ops::ControlFlow::Continue(()));
+                let mut see = |_: &Engine, _: f64| std::ops::ControlFlow::Continue(());
+                return run_to_equilibrium_watched(&scene, plan, &mut EachStep(&mut see));
             }
             let request = Request { interrupt: Interrupt::new(progress.flag), ..Request::default() };
             solve_equilibrium(&scene, &request, plan)

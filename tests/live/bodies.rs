@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use flockform::continuum::equilibrium::run_to_equilibrium;
 use flockform::continuum::plan::Plan;
 use flockform::engine::Engine;
+use flockform::flock::role::Role;
 use flockform::live::body::Body;
 use flockform::live::command::Command;
 use flockform::live::session::Session;
@@ -39,7 +40,7 @@ fn replayed(text: &str) -> Engine {
 
 /// That a saved scene ends where the body is, bit by bit.
 fn assert_replays(body: &Body) {
-    let text = body.saved().expect("can be written");
+    let text = body.saved(None).expect("can be written");
     let (now, then) = (body.engine(), replayed(&text));
     assert_eq!(now.step(), then.step());
     let bits = |engine: &Engine| -> Vec<[u64; 2]> {
@@ -179,6 +180,59 @@ fn hands_that_hold_nothing_or_the_frame_are_refused() {
     ask(&mut body, r#"{"do":"drag","by":[1e300,-1e300]}"#);
     step(&mut body, 5);
     assert!(body.engine().present().iter().all(|[x, y]| x.abs() < 1e4 && y.abs() < 1e4));
+}
+
+/// Ten columns that the leaders tear apart, and then throw out of bounds.
+#[test]
+fn a_step_that_diverged_is_replayed_as_if_it_had_not_been_taken() {
+    let thrown = "roles[1].motion={kind=\"keyframes\",interpolation=\"linear\",frames=[{step=4,displacement=[0.4,0.0]},\
+         {step=5,displacement=[0.8,0.0]},{step=6,displacement=[5.0,0.0]}]}";
+    let sets = [
+        "frame=none",
+        "record={}",
+        "roles[2].from=30",
+        "fracture={stretch=1.5,ghosts=\"none\"}",
+        "stop.divergence_ratio=0.2",
+        thrown,
+    ];
+    let mut body = begun("tension", &sets);
+    step(&mut body, 5);
+    let (previous, pe2) = (body.engine().previous().clone(), body.engine().energies()[1]);
+    let stopped = body.advance().expect_err("diverges");
+    assert!(stopped.contains("diverged at step 6"), "{stopped}");
+    assert_eq!((body.engine().step(), body.engine().breaks().len()), (5, 0));
+    assert_eq!((body.engine().previous(), body.engine().energies()[1]), (&previous, pe2));
+    ask(&mut body, r#"{"do":"set","key":"fracture.stretch","value":"3.0"}"#);
+    // The last column, led by hand from here on.
+    let leader = body.engine().roles().iter().position(|role| *role == Role::Leader).expect("led");
+    drag(&mut body, leader, [-0.1, 0.0], 2);
+    assert_replays(&body);
+}
+
+#[test]
+fn a_body_saved_in_another_folder_names_its_files_as_they_are_found_from_there() {
+    let folder = temporary();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("writable");
+    write("points.csv", "id,x,y\n1,0,0\n2,1,0\n3,0,1\n4,1,1\n");
+    write("pulled.csv", "id,ux,uy\n2,0.5,0\n4,0.5,0\n");
+    write(
+        "mine.toml",
+        "title = 'T'\nneighbours = { kind = 'within', radius = 1.5 }\n\
+         body = { shape = { kind = 'points', file = 'points.csv' } }\n\
+         roles = [{ region = { kind = 'ids', ids = [1, 3] }, role = 'clamped' },\n\
+         { region = { kind = 'ids', ids = [2, 4] }, role = 'leader', motion = { kind = 'csv', file = 'pulled.csv' } }]\n",
+    );
+    let scene =
+        Scene::from_file(&folder.path().join("mine.toml"), &[]).unwrap_or_else(|error| panic!("{error}"));
+    let mut body = Body::new(scene, Some(folder.path().into())).unwrap_or_else(|error| panic!("{error}"));
+    step(&mut body, 1);
+    let other = folder.path().join("saved/here");
+    std::fs::create_dir_all(&other).expect("writable");
+    let text = body.saved(Some(&other)).expect("found from there");
+    std::fs::write(other.join("again.toml"), &text).expect("writable");
+    let again = Scene::from_file(&other.join("again.toml"), &[]);
+    assert_eq!(again.unwrap_or_else(|error| panic!("{error}\n{text}")).stop.steps, 1);
+    assert!(text.contains("file = \"../../points.csv\""), "{text}");
 }
 
 #[test]
@@ -335,12 +389,12 @@ fn a_particle_that_was_just_let_go_follows_after_another_hand_too() {
 fn a_drag_that_changes_nothing_is_nothing_to_undo() {
     let mut body = begun("tension", &[]);
     step(&mut body, 10);
-    let saved = body.saved().expect("can be written");
+    let saved = body.saved(None).expect("can be written");
     for by in [&[][..], &["[0.0,0.0]"], &["[0.5,0.5]", "[0.0,0.0]"]] {
         pull(&mut body, 66, by);
         assert_eq!(body.undoable(), 0, "{by:?}");
     }
-    assert_eq!(body.saved().expect("can be written"), saved);
+    assert_eq!(body.saved(None).expect("can be written"), saved);
     step(&mut body, 2);
     assert_replays(&body);
 }

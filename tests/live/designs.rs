@@ -111,10 +111,10 @@ fn what_a_designer_does_is_in_the_file_and_is_undone() {
 #[test]
 fn designs_that_cannot_fly_are_refused_and_change_nothing() {
     let mut live = begun("square", &[]);
-    let before = live.saved();
+    let before = live.saved(None);
     let refused = |live: &mut Live, edit: Edit| {
         let words = try_edit(live, edit).expect_err("refused");
-        assert_eq!((live.saved(), live.undoable()), (before.clone(), 0), "{words}");
+        assert_eq!((live.saved(None), live.undoable()), (before.clone(), 0), "{words}");
         words
     };
     // Of three neighbours that move with it a corner that follows makes a formation that does not settle.

@@ -14,7 +14,7 @@ pub fn begun(name: &str, set: &[&str]) -> Live {
 }
 
 pub fn saved(live: &Live) -> Swarm {
-    let text = live.saved().expect("can be written");
+    let text = live.saved(None).expect("can be written");
     Swarm::parse("saved", "saved.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 

@@ -65,6 +65,13 @@ def test_a_solved_body_balances_its_load(soft_bar):
     assert mechanics["work"]["loads"] / 2 == pytest.approx(mechanics["strain_energy"], rel=1e-9)
 
 
+def test_a_load_that_is_taken_off_in_steps_is_solved_to_the_last_of_them(soft_bar):
+    body = flockform.Body(soft_bar | {"load_steps": {"schedule": [1.0, 0.3]}})
+    body.solve()
+    (reaction,) = body.reactions()
+    assert reaction["force"] == pytest.approx([-12.0, 0.0], abs=1e-6)
+
+
 def test_a_body_without_material_has_no_stress():
     body = flockform.Body("tension")
     for read in (body.stress, body.reactions, body.mechanics):

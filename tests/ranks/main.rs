@@ -260,13 +260,25 @@ fn every_lattice_settles_at_the_same_step() {
     }
 }
 
+/// Leaders that tear bonds at step 6, and are out of bounds there.
+const THROWN: &str = "roles[1].motion={kind=\"keyframes\",interpolation=\"linear\",frames=[\
+         {step=4,displacement=[0.4,0.0]},{step=5,displacement=[0.8,0.0]},{step=6,displacement=[5.0,0.0]}]}";
+
 #[test]
 fn a_divergence_is_seen_at_the_same_step_and_taken_back() {
-    let scene = load("feedback-grow", &["stop.divergence_ratio=1.01"]);
-    let expected = alone(&scene, 1 << 20);
-    assert!(expected.reason.starts_with("Diverged"), "{}", expected.reason);
-    for ranks in [2, 5] {
-        assert!(shared(&planned(&scene), 1 << 20, ranks).iter().all(|end| *end == expected), "{ranks} ranks");
+    // Bonds break in the step of the second.
+    let torn = "fracture={stretch=1.5,ghosts=\"none\"}";
+    for (name, sets) in [
+        ("feedback-grow", &["stop.divergence_ratio=1.01"][..]),
+        ("tension", &["frame=none", "record={}", torn, "stop.divergence_ratio=0.2", THROWN]),
+    ] {
+        let scene = load(name, sets);
+        let expected = alone(&scene, 1 << 20);
+        assert!(expected.reason.starts_with("Diverged") && expected.breaks == "[]", "{expected:?}");
+        for ranks in [2, 5] {
+            let ends = shared(&planned(&scene), 1 << 20, ranks);
+            assert!(ends.iter().all(|end| *end == expected), "{name}, {ranks} ranks");
+        }
     }
 }
 

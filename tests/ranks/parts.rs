@@ -299,6 +299,7 @@ fn what_is_found_on_the_way_of_a_body_in_parts_is_what_a_run_alone_finds() {
         ("fracture", &[&none]),
         ("fracture", &[&none, "frame=none"]),
         ("fracture-hexagonal", &[]),
+        ("tension", &["frame=none", &none, "stop.divergence_ratio=0.2", super::THROWN]),
         ("tension-immediate", &[cuts]),
         ("tension", &[action]),
         ("tension", &[action, "frame=none"]),

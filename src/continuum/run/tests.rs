@@ -134,6 +134,62 @@ fn a_sweep_that_is_stable_is_not_blamed_for_a_load_or_a_leader() {
     assert!(solved.starts_with("the loads") && !solved.contains("divergence_ratio"), "{solved}");
 }
 
+/// Everything that the end of a run is written from.
+fn end(outcome: &Outcome) -> String {
+    let engine = &outcome.engine;
+    let targets: Vec<_> =
+        (0..engine.body().count()).map(|i| engine.flock().target(i, engine.present())).collect();
+    let places = (engine.step(), engine.present(), engine.previous(), outcome.residual.to_bits());
+    let rest = (engine.roles(), engine.breaks(), engine.elastic(), engine.update(), targets);
+    format!("{places:?}\n{rest:?}")
+}
+
+#[test]
+fn a_step_that_diverged_leaves_nothing_behind() {
+    let right = "region={kind=\"edge\",side=\"right\"},role=\"leader\"";
+    let left = "{region={kind=\"edge\",side=\"left\"},role=\"clamped\"}";
+    let pull = |by: &str| format!("{{{right},motion={{kind=\"velocity\",per_step=[{by},0.0]}}}}");
+    let thrown = format!("{{{right},from=6,motion={{kind=\"velocity\",per_step=[100.0,0.0]}}}}");
+    let ghosts = "{region={kind=\"ids\",ids=[14,15]},role=\"ghost\",from=6}";
+    let taken = "{region={kind=\"box\",min=[0.5,-0.5],max=[8.5,9.5]},role=\"clamped\",when={quantity=\"pe2\",above=0.05}}";
+    // Bonds break in the step in which they are out of bounds.
+    let torn = format!(
+        "{{{right},motion={{kind=\"keyframes\",interpolation=\"linear\",frames=[{{step=4,displacement=[0.4,0.0]}},\
+         {{step=5,displacement=[0.8,0.0]}},{{step=6,displacement=[5.0,0.0]}}]}}}}"
+    );
+    let fracture = |ghosts: &str| format!("fracture={{stretch=1.5,ghosts=\"{ghosts}\"}}");
+    let material = [
+        "neighbours={kind=\"cells\"}",
+        "material={kind=\"isotropic\",young=100.0,poisson=0.3}",
+        "rule={mean={kind=\"material\"}}",
+        "actions=[{at=6,what={kind=\"set\",keys=[\"material.young=5000.0\"]}}]",
+    ];
+    let of = |roles: &[&str], more: &[&str]| {
+        let roles = format!("roles=[{}]", roles.join(","));
+        let sets = ["frame=none", "record={}", "stop.steps=40", "stop.divergence_ratio=2.0", &*roles];
+        let sets = [&sets[..], more].concat();
+        let diverged = run(plan(&scene("tension", &sets)), &mut |_, _| ControlFlow::Continue(()));
+        assert!(matches!(diverged.reason, StopReason::Diverged(_)), "{sets:?}: {}", diverged.reason);
+        let last = diverged.engine.step();
+        let before = run(plan(&scene("tension", &sets)), &mut |engine, _| match engine.step() {
+            step if step == last => ControlFlow::Break(()),
+            _ => ControlFlow::Continue(()),
+        });
+        assert_eq!(before.reason, StopReason::Interrupted, "{sets:?}");
+        let [found, expected] = [&diverged, &before].map(end);
+        assert!(found == expected, "{sets:?}\n{found}\n{expected}");
+    };
+    of(&[left, &thrown, ghosts], &[&fracture("none")]);
+    of(&[left, &pull("0.01"), &thrown], &material);
+    let bend = "stop.divergence_ratio=0.2";
+    for ghosts in ["none", "lattice", "mirrored"] {
+        of(&[left, &torn], &[&fracture(ghosts), bend]);
+    }
+    of(&[left, &pull("0.6"), taken], &[bend]);
+    of(&[left, &pull("0.6")], &["update.order=\"sequential\"", bend]);
+    of(&[left, &pull("0.6")], &["neighbours={kind=\"dynamic\",radius=1.1}", bend]);
+}
+
 #[test]
 fn a_load_that_grows_goes_on_growing() {
     let growing = [

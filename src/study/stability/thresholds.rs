@@ -83,8 +83,16 @@ fn crossing(f: &mut dyn FnMut(f64) -> f64, low: (f64, f64), high: (f64, f64)) ->
     let ((mut a, mut fa), (mut b, mut fb)) = (low, high);
     let mut last = 0;
     for _ in 0..100 {
-        let c = (a * fb - b * fa) / (fb - fa);
-        let fc = f(c);
+        let mut c = (a * fb - b * fa) / (fb - fa);
+        let mut fc = f(c);
+        if fc.is_nan() {
+            // No radius is known there.
+            c = 0.5 * (a + b);
+            fc = f(c);
+        }
+        if fc.is_nan() {
+            return c;
+        }
         if fc.abs() <= 1e-11 || (b - a).abs() <= 1e-12 * a.abs().max(b.abs()).max(1.0) {
             return c;
         }
