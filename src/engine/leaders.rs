@@ -36,7 +36,7 @@ impl Engine {
             // The ranks that have no particle of it compile their sweeps with the others.
             let Some(taking) = self.taking(change) else { continue };
             if let Some(before) = before.take() {
-                before.note_all(self);
+                before.note_roles(self);
             }
             for &which in &taking {
                 let particle = self.changes[change].particles[which];

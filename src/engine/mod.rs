@@ -410,10 +410,15 @@ impl Engine {
         // A particle that is no longer moved must agree in both buffers.
         self.previous.clone_from(&self.present);
         self.release_ghosts();
+        self.find_members();
+        self.compile_sweep();
+    }
+
+    /// Finds which particles neighbours that are found anew may be.
+    fn find_members(&mut self) {
         if let Some(present) = &mut self.present_neighbours {
             present.members = self.roles.iter().map(|role| role.is_body()).collect();
         }
-        self.compile_sweep();
     }
 
     /// Of a part only once the ranks share the body.

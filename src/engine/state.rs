@@ -281,9 +281,7 @@ pub(super) fn is_set(bits: &[u8], bit: usize) -> bool {
 impl Engine {
     /// Finds again what follows from roles, bonds and positions that were put in from outside.
     fn rebuild_caches(&mut self) {
-        if let Some(present) = &mut self.present_neighbours {
-            present.members = self.roles.iter().map(|role| role.is_body()).collect();
-        }
+        self.find_members();
         self.find_neighbours_of_last_step();
         self.compile_sweep();
     }

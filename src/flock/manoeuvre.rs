@@ -65,10 +65,11 @@ impl Posture {
     /// The posture about `about` \[length\] that carries places nearest to where they are, by least squares; of places on
     /// one line, one without shear.
     pub fn fitted(about: [f64; 2], carried: &[([f64; 2], [f64; 2])]) -> Self {
-        let mean = |of: fn(&([f64; 2], [f64; 2])) -> [f64; 2]| {
-            [0, 1].map(|k| carried.iter().map(|pair| of(pair)[k]).sum::<f64>() / carried.len().max(1) as f64)
+        let mean = |places: &dyn Fn(usize) -> [f64; 2]| {
+            let sum = |k: usize| (0..carried.len()).map(|n| places(n)[k]).sum::<f64>();
+            [0, 1].map(|k| sum(k) / carried.len().max(1) as f64)
         };
-        let (middle, to) = (mean(|pair| pair.0), mean(|pair| pair.1));
+        let (middle, to) = (mean(&|n| carried[n].0), mean(&|n| carried[n].1));
         // Sums of the products of coordinates, before with before and after with before.
         let (mut before, mut after) = ([[0.0; 2]; 2], [[0.0; 2]; 2]);
         for (place, now) in carried {
