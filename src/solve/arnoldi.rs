@@ -8,7 +8,7 @@
 //! the residual of each says how far it is to be believed: faer's `partial_eigen` says how many have converged, and
 //! knows the largest in size alone, which is why this is written here.
 
-use nalgebra::{Complex, DMatrix, DVector, Schur};
+use nalgebra::{Complex, DMatrix, DVector};
 
 /// An eigenvalue as far as it is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -177,7 +177,7 @@ impl Krylov {
         // About their mean, which leaves the digits that differ between eigenvalues of a nearly idle operator.
         let mean = small.trace() / size as f64;
         let about_mean = &small - DMatrix::identity(size, size) * mean;
-        let all = all_eigenvalues(about_mean)?.into_iter().map(|value| value + Complex::from(mean));
+        let all = all_eigenvalues(&about_mean)?.into_iter().map(|value| value + Complex::from(mean));
         let all: Vec<Complex<f64>> = all.collect();
         let most = |key: &dyn Fn(&Complex<f64>) -> f64| {
             all.iter().copied().max_by(|a, b| key(a).total_cmp(&key(b))).unwrap_or_default()
@@ -209,15 +209,11 @@ impl Krylov {
     }
 }
 
-/// All eigenvalues of a small matrix.
-fn all_eigenvalues(matrix: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
+/// All eigenvalues of a small matrix. By faer: nalgebra's QR steps never end where eigenvalues lie alike on both sides of their
+/// mean, as those of a nearly idle body and of its lagging frame do.
+fn all_eigenvalues(matrix: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     let size = matrix.nrows();
-    match Schur::try_new(matrix.clone(), f64::EPSILON, 100 * size + 1000) {
-        Some(found) => Some(found.complex_eigenvalues().iter().copied().collect()),
-        // Its QR steps never end where eigenvalues lie alike on both sides of the mean, as those of a nearly idle body and
-        // of its lagging frame do: faer has shifts for such occasions.
-        None => faer::Mat::from_fn(size, size, |row, column| matrix[(row, column)]).eigenvalues().ok(),
-    }
+    faer::Mat::from_fn(size, size, |row, column| matrix[(row, column)]).eigenvalues().ok()
 }
 
 /// The unit eigenvector of an eigenvalue known to rounding, by inverse iteration.
