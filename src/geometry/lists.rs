@@ -28,6 +28,6 @@ pub(crate) fn distinct<T: Ord>(of: impl IntoIterator<Item = T>) -> Vec<T> {
 }
 
 /// The sides of a polygon: each corner and the next.
-pub(crate) fn ways<T: Copy>(corners: &[T]) -> impl Iterator<Item = [T; 2]> {
+pub(crate) fn sides<T: Copy>(corners: &[T]) -> impl Iterator<Item = [T; 2]> {
     (0..corners.len()).map(|k| [corners[k], corners[(k + 1) % corners.len()]])
 }

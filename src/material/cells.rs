@@ -279,7 +279,7 @@ impl Cells {
 
     /// Sides of a cell, counter-clockwise.
     pub fn sides(&self, cell: usize) -> impl Iterator<Item = [u32; 2]> {
-        lists::ways(self.of(cell))
+        lists::sides(self.of(cell))
     }
 
     /// Sides that belong to one cell only, the body to the left of each, in the order of cells.

@@ -7,8 +7,8 @@
 //! * Triangle: constant strain (M. J. Turner et al., 1956).
 //! * Quadrilateral: bilinear, 2x2 Gauss points (O. C. Zienkiewicz and R. L. Taylor, *The Finite
 //!   Element Method*, vol. 1). Plane strain near nu = 1/2 would lock it, as it would the triangle:
-//!   see [`super::dilatation`]. A whole cell of a lattice whose sides are not at right angles: assumed stress, see
-//!   [`element_of`].
+//!   see [`super::dilatation`]. A parallelogram without right angles: assumed stress
+//!   (T. H. H. Pian and K. Sumihara, *Rational approach for assumed stress finite elements*, IJNME 20, 1984).
 //! * Any other polygon: the virtual element of lowest order (L. Beirao da Veiga, F. Brezzi and
 //!   L. D. Marini, *Virtual elements for linear elasticity problems*, SIAM J. Numer. Anal. 51, 2013; in the
 //!   form of A. L. Gain, C. Talischi and G. H. Paulino, CMAME 282, 2014). See [`polygon`].
@@ -42,37 +42,41 @@ pub enum ShapeError {
     },
 }
 
-/// Stiffness of a cell \[force / length\], shape \[2 corners, 2 corners\], symmetric to the bit: a
+/// Stiffness of a whole cell of a lattice \[force / length\], shape \[2 corners, 2 corners\], symmetric to the bit: a
 /// triangle, a quadrilateral or a virtual element by the number of corners. `corners` \[length\] run
 /// counter-clockwise.
 pub fn element(corners: &[[f64; 2]], stiffness: &Voigt) -> Result<DMatrix<f64>, ShapeError> {
-    match corners.len() {
-        3 => triangle(corners, stiffness),
-        4 => quadrilateral(corners, stiffness),
-        _ => polygon(corners, stiffness),
-    }
+    whole_cell(corners, [stiffness; 2], false)
 }
 
 /// Stiffness of a cell of a material whose dilatations are averaged over several cells: what each cell has to itself
 /// ([`Elastic::stiffness_of_cells`]). `cut` asks for [`cut_cell`] instead of [`element`].
 ///
 /// The stabilisation, beside the mean strain, is that of the whole material, which stays bounded as nu goes to 1/2;
-/// rectangles are then stabilised as cut cells are. Parallelograms without right angles are those of assumed stress.
+/// rectangles are then stabilised as cut cells are.
 ///
 /// # Errors
 /// As [`element`].
 pub fn element_of(corners: &[[f64; 2]], elastic: &Elastic, cut: bool) -> Result<DMatrix<f64>, ShapeError> {
     let (own, whole) = (elastic.stiffness_of_cells(), elastic.stiffness());
-    let averaged = elastic.averaged_dilatation().is_some();
-    match (cut, corners.len()) {
-        (true, _) => resistance(corners, &own, |corners| cut_stabilisation(corners, whole)),
-        (false, 3) => triangle(corners, &own),
-        (false, 4) if is_oblique(corners) => {
-            resistance(corners, &own, |corners| oblique_stabilisation(corners, whole))
-        }
-        (false, 4) if averaged => resistance(corners, &own, |corners| cut_stabilisation(corners, whole)),
-        (false, 4) => quadrilateral(corners, &own),
-        (false, _) => resistance(corners, &own, |corners| stabilisation(corners, whole)),
+    if cut {
+        return resistance(corners, &own, |corners| cut_stabilisation(corners, whole));
+    }
+    whole_cell(corners, [&own, whole], elastic.averaged_dilatation().is_some())
+}
+
+/// The cell by what it has to itself, and by the whole material where that is not all of it.
+fn whole_cell(
+    corners: &[[f64; 2]],
+    [own, whole]: [&Voigt; 2],
+    is_averaged: bool,
+) -> Result<DMatrix<f64>, ShapeError> {
+    match corners.len() {
+        3 => triangle(corners, own),
+        4 if is_oblique(corners) => resistance(corners, own, |corners| oblique_stabilisation(corners, whole)),
+        4 if is_averaged => resistance(corners, own, |corners| cut_stabilisation(corners, whole)),
+        4 => quadrilateral(corners, own),
+        _ => resistance(corners, own, |corners| stabilisation(corners, whole)),
     }
 }
 
@@ -165,9 +169,8 @@ fn is_oblique(corners: &[[f64; 2]]) -> bool {
     (a - b + c - d).norm() <= 1e-9 * size.sqrt() && along.dot(&up).abs() > 1e-9 * size
 }
 
-/// The rest of a parallelogram of assumed stress (T. H. H. Pian and K. Sumihara, *Rational approach for assumed stress finite
-/// elements*, IJNME 20, 1984): stress along either pair of sides that grows from one of them to the other is uniaxial, so
-/// `T = A / 3 sum E_t t t' / l^2` over the two directions `t`, `l` the length of sides along `t`, `E_t` the modulus of tension
+/// The rest of a parallelogram of assumed stress: stress along either pair of sides that grows from one of them to the other
+/// is uniaxial, so `T = A / 3 sum E_t t t' / l^2` over the two directions `t`, `l` the length of sides along `t`, `E_t` the modulus of tension
 /// along `t`. Bilinear cells resist bending by its direction: with them the error on a ring of cells of 70 degrees falls by
 /// order 1.88 from spacing 1/2 to 1/4, with these by 2.03.
 fn oblique_stabilisation(corners: &[[f64; 2]], stiffness: &Voigt) -> DMatrix<f64> {

@@ -14,7 +14,7 @@ use super::sites::{NearSite, Sites, State};
 use super::{FitError, ROUNDING, Scale, is_kept_corner, order};
 use crate::flock::lattice::{Lattice, Site};
 use crate::flock::vectors::distance;
-use crate::geometry::lists::{distinct, ways};
+use crate::geometry::lists::{distinct, sides};
 use crate::geometry::locate::Finder;
 use crate::geometry::meeting::meetings;
 use crate::geometry::outline::Place;
@@ -140,7 +140,7 @@ impl<'a> Cutter<'a> {
             }
             let number = self.candidates.len() as u32;
             self.known.insert((site, kind), number);
-            for [corner, next] in ways(&corners) {
+            for [corner, next] in sides(&corners) {
                 let node = self.node_of(corner);
                 self.cells_of[node as usize].push(number);
                 let key = side_key(corner, next);
@@ -275,7 +275,7 @@ impl<'a> Cutter<'a> {
     fn around(&self, point: [f64; 2]) -> (Option<u32>, Vec<(SideKey, f64)>) {
         let [i, j] = self.lattice.grid_coordinates(point).map(|v| v.round() as i32);
         let near = ROUNDING * self.scale.spacing;
-        let (mut inside, mut sides) = (None, Vec::new());
+        let (mut inside, mut near_sides) = (None, Vec::new());
         let window = (i - 6..=i + 6).flat_map(|i| (j - 6..=j + 6).map(move |j| [i, j]));
         for cell in window.flat_map(|site| {
             (0..self.scale.templates.len()).filter_map(move |kind| self.known.get(&(site, kind as u32)))
@@ -283,7 +283,7 @@ impl<'a> Cutter<'a> {
             let corners = &self.candidates[*cell as usize].corners;
             let mut least = f64::INFINITY;
             let mut beside = None;
-            for [corner, next] in ways(corners) {
+            for [corner, next] in sides(corners) {
                 let [a, b] = [corner, next].map(|site| self.nodes[self.node_of(site) as usize].point);
                 let length = distance(a, b);
                 let left = ((b[0] - a[0]) * (point[1] - a[1]) - (b[1] - a[1]) * (point[0] - a[0])) / length;
@@ -300,12 +300,12 @@ impl<'a> Cutter<'a> {
                 inside = Some(*cell);
             } else if least >= -near
                 && let Some(side) = beside
-                && !sides.iter().any(|(key, _)| *key == side.0)
+                && !near_sides.iter().any(|(key, _)| *key == side.0)
             {
-                sides.push(side);
+                near_sides.push(side);
             }
         }
-        (inside, sides)
+        (inside, near_sides)
     }
 
     /// Gives every chord of the outline and of the lines inside to the cell that it cuts, or to the side that it runs along.
@@ -382,7 +382,7 @@ impl<'a> Cutter<'a> {
     fn boundary(&self, cell: u32) -> Vec<u32> {
         let corners = &self.candidates[cell as usize].corners;
         let mut nodes = Vec::with_capacity(2 * corners.len());
-        for [corner, next] in ways(corners) {
+        for [corner, next] in sides(corners) {
             nodes.push(self.node_of(corner));
             let key = side_key(corner, next);
             if let Some(cuts) = self.cuts.get(&key) {
@@ -472,7 +472,7 @@ impl<'a> Cutter<'a> {
     /// Whether a part of a cell is inside: what the outline says whose chords bound it, or its lattice points.
     fn is_inside(&self, candidate: &Candidate, part: &[u32]) -> Result<bool, FitError> {
         let mut verdicts = [false; 2];
-        for way in ways(part) {
+        for way in sides(part) {
             let back = [way[1], way[0]];
             if candidate.chords.contains(&way) {
                 verdicts[1] = true;

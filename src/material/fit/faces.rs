@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use crate::flock::lattice::Site;
-use crate::geometry::lists::ways;
+use crate::geometry::lists::sides;
 use crate::geometry::outline::Place;
 use crate::geometry::partition::Partition;
 use crate::geometry::point::area;
@@ -65,7 +65,7 @@ impl Faces {
     /// The face that has each side, the way it runs there.
     pub fn owners(&self) -> HashMap<[u32; 2], usize> {
         let faces = self.faces.iter().enumerate();
-        faces.flat_map(|(number, face)| ways(&face.corners).map(move |way| (way, number))).collect()
+        faces.flat_map(|(number, face)| sides(&face.corners).map(move |way| (way, number))).collect()
     }
 
     /// To be called when the faces are final.
@@ -90,7 +90,7 @@ impl Faces {
                     continue;
                 }
                 group.push(face);
-                let across = ways(&self.faces[face].corners).filter(|way| !self.interfaces.contains(way));
+                let across = sides(&self.faces[face].corners).filter(|way| !self.interfaces.contains(way));
                 open.extend(across.filter_map(|[a, b]| owner.get(&[b, a])));
             }
             let points = |face: &usize| -> Vec<[f64; 2]> {

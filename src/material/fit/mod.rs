@@ -36,7 +36,7 @@ use crate::flock::outlay::{Census, cell_width};
 use crate::flock::part::Extent;
 use crate::flock::vectors::{Vectors, distance};
 use crate::flock::window::Window;
-use crate::geometry::lists::ways;
+use crate::geometry::lists::sides;
 use crate::geometry::outline::{Outline, Place};
 use crate::geometry::partition::Partition;
 use crate::geometry::point::area;
@@ -230,7 +230,7 @@ impl Fitted {
         self.cells.kind.iter().for_each(|&kind| used[kind as usize] = true);
         for shape in self.cells.shapes.iter().zip(used).filter_map(|(shape, used)| used.then_some(shape)) {
             least.area = least.area.min(area(shape) / scale.area);
-            for [a, b] in ways(shape) {
+            for [a, b] in sides(shape) {
                 let length = distance(a, b);
                 let normal = [(b[1] - a[1]) / length, (a[0] - b[0]) / length];
                 let along = shape.iter().map(|p| normal[0] * p[0] + normal[1] * p[1]);

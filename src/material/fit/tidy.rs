@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::faces::{Face, Faces};
 use super::{LEAST_AREA, LEAST_SIDE, LEAST_WIDTH, ROUNDING, Scale};
 use crate::flock::vectors::distance;
-use crate::geometry::lists::{distinct, ways};
+use crate::geometry::lists::{distinct, sides};
 use crate::geometry::point;
 
 /// One makes work for the other: after a few rounds nothing is left to do.
@@ -14,12 +14,9 @@ const ROUNDS: usize = 4;
 /// A side that shrinks may change the area of what is around it by this part: its chord cuts an arc shorter.
 const AREA_CHANGE: f64 = 0.02;
 
-/// Parts by which sizes differ that are equal but for rounding: it is not to decide what becomes of the cells.
-const EQUAL: f64 = 1e-9;
-
-/// A size in such parts of another.
-fn parts(size: f64, of: f64) -> i64 {
-    (size / of / EQUAL).round() as i64
+/// A size in steps of another that are larger than rounding, which is not to decide what becomes of equal cells.
+fn steps(size: f64, of: f64) -> i64 {
+    (size / of / ROUNDING).round() as i64
 }
 
 pub fn tidy(faces: &mut Faces, scale: &Scale) {
@@ -68,7 +65,7 @@ fn is_dart(faces: &Faces, corners: &[u32]) -> bool {
 /// How compact a face is: its area over the square of its circumference \[1\].
 fn compactness(faces: &Faces, corners: &[u32]) -> f64 {
     let length = |[a, b]: [u32; 2]| distance(faces.nodes[a as usize].point, faces.nodes[b as usize].point);
-    area(faces, corners) / ways(corners).map(length).sum::<f64>().powi(2)
+    area(faces, corners) / sides(corners).map(length).sum::<f64>().powi(2)
 }
 
 /// Joins each face that is too small, too narrow or dented with the neighbour of its region that makes the most compact face with it. By
@@ -78,8 +75,8 @@ fn merge(faces: &mut Faces, scale: &Scale) -> usize {
     let (least, narrow) = (LEAST_AREA * scale.area, LEAST_WIDTH * scale.altitude);
     let mut owner = faces.owners();
     let is_fine = |faces: &Faces, corners: &[u32]| {
-        area(faces, corners) >= least * (1.0 - EQUAL)
-            && width(faces, corners) >= narrow * (1.0 - EQUAL)
+        area(faces, corners) >= least * (1.0 - ROUNDING)
+            && width(faces, corners) >= narrow * (1.0 - ROUNDING)
             && !is_dart(faces, corners)
     };
     let mut small: Vec<(i64, usize)> = (0..faces.faces.len())
@@ -87,7 +84,7 @@ fn merge(faces: &mut Faces, scale: &Scale) -> usize {
             let corners = &faces.faces[face].corners;
             !corners.is_empty() && !is_fine(faces, corners)
         })
-        .map(|face| (parts(area(faces, &faces.faces[face].corners), scale.area), face))
+        .map(|face| (steps(area(faces, &faces.faces[face].corners), scale.area), face))
         .collect();
     small.sort_unstable();
     let mut merged = 0;
@@ -96,20 +93,21 @@ fn merge(faces: &mut Faces, scale: &Scale) -> usize {
         if corners.is_empty() || is_fine(faces, corners) {
             continue;
         }
-        let beside = ways(corners).filter_map(|[a, b]| owner.get(&[b, a]).copied());
+        let beside = sides(corners).filter_map(|[a, b]| owner.get(&[b, a]).copied());
         let beside = distinct(beside.filter(|&other| faces.faces[other].region == *region));
         let joined = beside.into_iter().filter_map(|other| {
             let joined = join(corners, &faces.faces[other].corners)?;
             is_simple(faces, &joined).then(|| (compactness(faces, &joined), other, joined))
         });
-        if let Some((_, other, joined)) = joined.reduce(|a, b| if b.0 > a.0 * (1.0 + EQUAL) { b } else { a })
+        if let Some((_, other, joined)) =
+            joined.reduce(|a, b| if b.0 > a.0 * (1.0 + ROUNDING) { b } else { a })
         {
             for number in [face, other] {
-                ways(&faces.faces[number].corners).for_each(|way| {
+                sides(&faces.faces[number].corners).for_each(|way| {
                     owner.remove(&way);
                 });
             }
-            owner.extend(ways(&joined).map(|way| (way, other)));
+            owner.extend(sides(&joined).map(|way| (way, other)));
             faces.faces[face].corners.clear();
             let region = faces.faces[other].region;
             faces.faces[other] = Face { corners: joined, whole: None, region };
@@ -143,7 +141,7 @@ fn drop_idle(faces: &mut Faces) {
 
 /// The loop around two faces; `None` where they touch in more than one line.
 fn join(a: &[u32], b: &[u32]) -> Option<Vec<u32>> {
-    let all: Vec<[u32; 2]> = ways(a).chain(ways(b)).collect();
+    let all: Vec<[u32; 2]> = sides(a).chain(sides(b)).collect();
     let outer: Vec<[u32; 2]> =
         all.iter().filter(|[from, to]| !all.contains(&[*to, *from])).copied().collect();
     let mut joined = vec![outer.first()?[0]];
@@ -178,22 +176,22 @@ fn is_simple(faces: &Faces, face: &[u32]) -> bool {
 /// Shrinks sides along the outline that are shorter than `least` \[length\] to one of their ends.
 fn shrink(faces: &mut Faces, least: f64) -> usize {
     let mut around: HashMap<u32, Vec<usize>> = HashMap::new();
-    let mut sides: HashMap<[u32; 2], usize> = HashMap::new();
+    let mut cells_at: HashMap<[u32; 2], usize> = HashMap::new();
     for (number, face) in faces.faces.iter().enumerate() {
-        for [a, b] in ways(&face.corners) {
+        for [a, b] in sides(&face.corners) {
             around.entry(a).or_default().push(number);
-            *sides.entry([a.min(b), a.max(b)]).or_default() += 1;
+            *cells_at.entry([a.min(b), a.max(b)]).or_default() += 1;
         }
     }
     let length = |faces: &Faces, [a, b]: [u32; 2]| {
         distance(faces.nodes[a as usize].point, faces.nodes[b as usize].point)
     };
-    let mut short: Vec<(i64, [u32; 2])> = sides
+    let mut short: Vec<(i64, [u32; 2])> = cells_at
         .into_iter()
         // Any other side with cells on both sides joins two strands of the outline, or a particle inside with it.
         .filter(|(side, cells)| *cells == 1 || faces.interfaces.contains(side))
-        .filter(|(side, _)| length(faces, *side) < least * (1.0 - EQUAL))
-        .map(|(side, _)| (parts(length(faces, side), least), side))
+        .filter(|(side, _)| length(faces, *side) < least * (1.0 - ROUNDING))
+        .map(|(side, _)| (steps(length(faces, side), least), side))
         .collect();
     short.sort_unstable();
     let mut shrunk = 0;
@@ -204,7 +202,7 @@ fn shrink(faces: &mut Faces, least: f64) -> usize {
         };
         let (gone, kept) = if rank(a) > rank(b) { (b, a) } else { (a, b) };
         let is_side = around.get(&gone).is_some_and(|cells| {
-            cells.iter().any(|&cell| ways(&faces.faces[cell].corners).any(|w| w == [a, b] || w == [b, a]))
+            cells.iter().any(|&cell| sides(&faces.faces[cell].corners).any(|w| w == [a, b] || w == [b, a]))
         });
         if !is_side || faces.nodes[gone as usize].is_corner {
             continue;
@@ -240,7 +238,7 @@ fn replace(faces: &mut Faces, around: &mut HashMap<u32, Vec<usize>>, gone: u32, 
         return false;
     }
     for (cell, new) in changed {
-        for [a, b] in ways(&faces.faces[cell].corners) {
+        for [a, b] in sides(&faces.faces[cell].corners) {
             let moved = [a, b].map(|node| if node == gone { kept } else { node });
             if moved != [a, b] && faces.interfaces.contains(&[a, b]) {
                 faces.interfaces.extend([moved, [moved[1], moved[0]]]);

@@ -13,7 +13,7 @@ fn sheets() -> Vec<Voigt> {
     .to_vec()
 }
 
-/// Straight and distorted cells of 3 to 7 corners.
+/// Straight and distorted cells of 3 to 7 corners, and a parallelogram.
 fn shapes() -> Vec<Vec<[f64; 2]>> {
     let ring = |m: usize, stretch: f64| {
         let corner = |k: usize| {
@@ -23,7 +23,8 @@ fn shapes() -> Vec<Vec<[f64; 2]>> {
         };
         (0..m).map(corner).collect::<Vec<_>>()
     };
-    (3..=7).flat_map(|m| [ring(m, 0.0), ring(m, 1.0)]).collect()
+    let oblique = vec![[7.0, 2.0], [8.0, 2.2], [8.3, 3.3], [7.3, 3.1]];
+    (3..=7).flat_map(|m| [ring(m, 0.0), ring(m, 1.0)]).chain([oblique]).collect()
 }
 
 fn moved(corners: &[[f64; 2]], field: impl Fn([f64; 2]) -> [f64; 2]) -> DVector<f64> {
