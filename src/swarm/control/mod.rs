@@ -287,10 +287,13 @@ impl Control {
     /// The velocity \[m/s\] with which a member that takes time to brake ends the next period on its way to a target \[m\];
     /// `None` of others.
     pub fn next_velocity(&self, member: usize, target: [f64; 2]) -> Option<[f64; 2]> {
-        let [position, velocity] = [&self.tracked.present, &self.tracked.velocity].map(|of| of.get(member));
-        let mut robot = Robot { position, velocity, yaw: 0.0 };
-        self.dynamics().step(&mut robot, target, self.period);
-        self.brakes.then_some(robot.velocity)
+        self.brakes.then(|| {
+            let [position, velocity] =
+                [&self.tracked.present, &self.tracked.velocity].map(|of| of.get(member));
+            let mut robot = Robot { position, velocity, yaw: 0.0 };
+            self.dynamics().step(&mut robot, target, self.period);
+            robot.velocity
+        })
     }
 
     /// Gives a leader that is moved from outside its next place \[m\]; false if it is not one, or the place lies

@@ -104,25 +104,25 @@ impl Track {
             return self.restart(pose);
         }
         let is_surprise = off > SURPRISE * dynamics.acceleration * time * time + NOISE * deviation;
-        let most = dynamics.acceleration * time;
+        let led = dynamics.acceleration * time;
         // Poses that are farther off than any robot of this model can be are inexact, which the velocity then is too.
-        let most = if off > most * time + NOISE * deviation { INEXACT * most } else { most };
+        let most = if off > led * time + NOISE * deviation { INEXACT * led } else { led };
         // The errors before and after the pose add up to what it is off: they may cancel, and a half is left in the end.
         self.doubt = if is_surprise { most.min((2.0 * off / time).max(0.5 * self.doubt)) } else { 0.0 };
         let gains = Gains::of(dynamics.acceleration, period, deviation);
         // No robot of this model has changed its velocity by more, unless nothing was known of it.
         let change = gains.beta * off / time;
-        let share = if self.is_new { 1.0 } else { (2.0 * dynamics.acceleration * time / change).min(1.0) };
+        let share = if self.is_new { 1.0 } else { (2.0 * led / change).min(1.0) };
         self.is_new = false;
         let size = |[x, y]: [f64; 2]| x.hypot(y);
         // One whose limit has been lowered is still faster for a while.
-        let most = dynamics.speed.max(size(self.robot.velocity));
+        let fastest = dynamics.speed.max(size(self.robot.velocity));
         self.robot = expected;
         self.robot.position = [0, 1].map(|k| expected.position[k] + gains.alpha * surprise[k]);
         self.robot.velocity = [0, 1].map(|k| expected.velocity[k] + share * gains.beta * surprise[k] / time);
         let speed = size(self.robot.velocity);
-        if speed > most {
-            self.robot.velocity = self.robot.velocity.map(|v| v * most / speed);
+        if speed > fastest {
+            self.robot.velocity = self.robot.velocity.map(|v| v * fastest / speed);
         }
         self.begin(pose);
     }
