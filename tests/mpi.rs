@@ -354,6 +354,27 @@ fn a_run_in_parts_writes_the_tables_of_a_run_alone() {
 
 #[test]
 #[ignore = "needs mpirun"]
+fn a_run_in_parts_has_a_report_of_a_sample() {
+    let folder = temporary();
+    std::fs::write(folder.path().join("fitted.toml"), FITTED).expect("written");
+    let fine = ["--set", "body.shape={kind=\"grid\",columns=300,rows=150}", "--steps", "20"];
+    for (name, more) in [("tension", &fine[..]), ("fitted.toml", &[]), ("beam-loaded", &LARGE_BEAM)] {
+        let run = |out: &'static str| [&["run", name, "--figures", "none", "--out", out][..], more].concat();
+        assert_ends_well(&flockform(&run("alone"), folder.path()), name);
+        assert_ends_well(&on_ranks(3, &run("three"), folder.path()), name);
+        let report = |out: &str| {
+            std::fs::read_to_string(folder.path().join(out).join("report.html")).expect("a report")
+        };
+        let says = |out: &str| report(out).contains("Ranks had a part of the body each");
+        assert!(says("three") && !says("alone"), "{name}");
+        let [found, expected] = ["three", "alone"].map(|out| folder.path().join(out));
+        assert_same(&found, &expected, name);
+        [found, expected].map(|of| std::fs::remove_dir_all(of).expect("removed"));
+    }
+}
+
+#[test]
+#[ignore = "needs mpirun"]
 fn every_rank_writes_its_piece_of_a_frame() {
     let folder = temporary();
     let run = ["run", "tension", "--out", "o", "--steps", "30", "--set", "record.vtk_every=20"];

@@ -48,7 +48,10 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
             let parts = |scene: &Scene| if laid_out_whole_for(scene).is_none() { count } else { 1 };
             let scene = SceneArguments::new(file, set).load_part(&[], parts)?;
             let parts = PartShares::new(&scene, count)?;
-            let of_parts = parts.map(|parts| parts.facts(of_part(&scene, &parts.largest, count)));
+            let of_part = |parts: &PartShares| {
+                [true, false].map(|report| of_part(&scene, &parts.largest, count, report))
+            };
+            let of_parts = parts.map(|parts| parts.facts(of_part(&parts)));
             if let (Some(facts), Err(too_large)) = (&of_parts, require(&scene, at_least(&scene))) {
                 // What is said of the whole would take the memory that it takes.
                 let facts = facts.iter().map(|(name, value)| json!({ "name": name, "value": value }));

@@ -119,7 +119,7 @@ impl Prepared {
             let scene = interruptible(scene);
             let plan = Plan::of_part(&scene, team)?;
             let digest = digest_of_parts(&plan, team);
-            let bytes = memory::of_part(&scene, &plan, team.count());
+            let bytes = memory::of_part(&scene, &plan, team.count(), arguments.outputs().report);
             memory::require(&scene, (ranks::others_here() + 1) as f64 * bytes as f64)?;
             left.as_mut().map_or(Ok(()), |left| left.fit(&scene, &plan, digest))?;
             return Ok(Self { left, asked, scene, words: String::new(), plan, digest, is_parted });
@@ -316,7 +316,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
 impl RunArguments {
     /// Whether each rank is to lay out a part of the body: where nothing that is asked for needs the whole.
     fn is_parted(&self, scene: &Scene) -> bool {
-        let needs_none = self.outputs() == Outputs::TABLES
+        let needs_none = !self.outputs().draws()
             && !self.film.is_asked()
             && !self.record.is_asked()
             && self.publish.is_none();

@@ -112,8 +112,8 @@ impl PartShares {
         sweep.domain_mut().map_or((0, 0), needs)
     }
 
-    /// For the plan: names and values, with the bytes that the rank takes which takes most.
-    pub fn facts(&self, bytes: usize) -> Vec<(String, String)> {
+    /// For the plan: names and values, with the bytes that the rank takes which takes most, with a report and without.
+    pub fn facts(&self, bytes: [usize; 2]) -> Vec<(String, String)> {
         let (least, most) = (self.particles.iter().min(), self.particles.iter().max());
         let (least, most) = (least.copied().unwrap_or_default(), most.copied().unwrap_or_default());
         let exchanged = match self.steps {
@@ -131,9 +131,10 @@ impl PartShares {
             steps => format!("; of others it receives {} bytes before every {steps} steps", self.halo_bytes),
         };
         let parts = format!(
-            "with --figures none --no-report each rank lays out and holds its part alone, {least} to {most} particles{exchanged}"
+            "with --figures none each rank lays out and holds its part alone, {least} to {most} particles{exchanged}"
         );
-        let memory = format!("at most about {} with --figures none --no-report", readable_bytes(bytes));
+        let [all, tables] = bytes.map(readable_bytes);
+        let memory = format!("at most about {all} with --figures none; {tables} with --no-report as well");
         let facts = [("parts", parts), ("memory of a part", memory)];
         facts.map(|(name, value)| (name.to_owned(), value)).into()
     }

@@ -4,7 +4,7 @@
 
 use super::figures::axes::Axes;
 use super::figures::{Formats, MOST_DOTS, PNG_ZOOM, components, page, panels};
-use super::report::run::{Packed, packed};
+use super::report::recorder::{Packed, packed};
 use crate::continuum::memory::{measured, solving, stepped};
 use crate::continuum::plan::Plan;
 use crate::material::cells::Cells;
@@ -68,8 +68,8 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
 }
 
 /// Bytes that one of so many ranks with a part of a body takes at its largest, by a program whose own code takes so many: there
-/// are no figures and no report, and tables are written row by row.
-pub fn of_part(scene: &Scene, plan: &Plan, ranks: usize, program: usize) -> usize {
+/// are no figures, and tables are written row by row. The first rank keeps what a `report` shows.
+pub fn of_part(scene: &Scene, plan: &Plan, (ranks, report): (usize, bool), program: usize) -> usize {
     /// Memory of MPI, and what it shares with each rank on a machine; measured with Open MPI 4.1.
     const MPI: [usize; 2] = [4 << 20, 3 << 19];
     /// Ranks that share a machine's memory, as far as it is known beforehand.
@@ -78,8 +78,11 @@ pub fn of_part(scene: &Scene, plan: &Plan, ranks: usize, program: usize) -> usiz
     const ON_THE_WAY: usize = 2 * 2 * 16;
     let [each, of_rank] = MPI;
     let halo = plan.setup.body.part.as_ref().map_or(0, |part| part.exact.len() - part.owned.len());
+    let Packed { values, frames, packing, .. } =
+        if report { packed(plan, scene.is_solved_at_once()) } else { Packed::default() };
     let most = measured(plan).max(ON_THE_WAY * halo).max(solving(scene, plan));
-    program + RUNNING + stepped(plan) + each + of_rank * ranks.min(ON_A_MACHINE) + most
+    let shown = values.max(packing) + frames[0];
+    program + RUNNING + stepped(plan) + each + of_rank * ranks.min(ON_A_MACHINE) + most + shown
 }
 
 /// Bytes of what the figures of so many steps are while they are drawn, as many at once as there are threads.

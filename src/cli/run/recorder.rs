@@ -1,5 +1,5 @@
 //! The records of a run: snapshots, probes, measurements, frames, and what its report shows. Where each rank has a part of the
-//! body they are of tables and frames alone, and the first rank has the probes of all.
+//! body there are no snapshots, and the first rank has the probes of all, and what the report shows.
 
 use std::time::{Duration, Instant};
 
@@ -11,6 +11,7 @@ use flockform::export::memory::Outputs;
 use flockform::export::report::view::View;
 use flockform::export::report::{AnimationState, RunRecorder};
 use flockform::export::{ExportError, OutputFolder, VtkSeries, probes_of_parts, write_piece};
+use flockform::ranks::Team;
 use flockform::scene::{LoadSteps, Scene};
 
 use crate::cli::checkpoint::{Recorded, ResumedRun};
@@ -197,7 +198,8 @@ impl<'a> Recorder<'a> {
         if let Some(animation) = &mut self.animation {
             animation.close(self.scene, outcome);
         }
-        let animation = self.animation.as_mut().filter(|_| self.outputs.report);
+        let is_written = self.outputs.report && engine.parted().is_none_or(Team::is_first);
+        let animation = self.animation.as_mut().filter(|_| is_written);
         let stage = animation.map(|animation| animation.stage(self.scene, outcome));
         let writing = self.writing + start.elapsed();
         let Self { snapshots, probes, load_steps, animation, films, .. } = self;

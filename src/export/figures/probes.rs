@@ -20,24 +20,25 @@ pub fn charts(probes: &[ProbeSeries], body: &Body, unit: &str) -> Vec<Chart> {
     if probes.is_empty() {
         return Vec::new();
     }
-    let (shown, reference) = (&probes[..probes.len().min(MOST_LINES)], &body.reference);
+    let shown = &probes[..probes.len().min(MOST_LINES)];
     let mut note = "probed particles, by id".to_owned();
     if shown.len() < probes.len() {
         note = format!("the first {} of {} {note}", shown.len(), probes.len());
     }
     let squared = format!("{unit}²");
-    let displaced = |values: &[f64], initial: f64| values.iter().map(|value| value - initial).collect();
+    // A history begins before the body has moved.
+    let displaced = |values: &[f64]| values.iter().map(|value| value - values[0]).collect();
     type Values<'a> = &'a dyn Fn(&ProbeSeries) -> Vec<f64>;
     let quantities: [(&str, &str, Values<'_>); 4] = [
-        ("x displacement", unit, &|probe| displaced(&probe.positions.x, reference.x[probe.particle])),
-        ("y displacement", unit, &|probe| displaced(&probe.positions.y, reference.y[probe.particle])),
+        ("x displacement", unit, &|probe| displaced(&probe.positions.x)),
+        ("y displacement", unit, &|probe| displaced(&probe.positions.y)),
         ("PE1", &squared, &|probe| probe.pe1.clone()),
         ("PE2", unit, &|probe| probe.pe2.clone()),
     ];
     let chart = |(quantity, unit, values): (&str, &str, Values<'_>)| {
         let line = |(probe, colour): (&ProbeSeries, &'static str)| {
             let points = values(probe).into_iter().enumerate().map(|(step, value)| [step as f64, value]);
-            Series::new(body.id(probe.particle).to_string(), colour, Style::Line, points.collect())
+            Series::new(body.id_of(probe.particle).to_string(), colour, Style::Line, points.collect())
         };
         let axes = [Axis::new("step", ""), Axis::new(quantity, unit)];
         let series = shown.iter().zip(SERIES).map(line).collect();

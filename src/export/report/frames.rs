@@ -29,6 +29,13 @@ pub struct Frame {
     pub tracks: Vec<QuantizedChannel>,
 }
 
+impl Frame {
+    /// Lets go of all values.
+    pub fn clear(&mut self) {
+        self.tracks.iter_mut().for_each(|track| *track = QuantizedChannel::of(&[], track.bits, None));
+    }
+}
+
 #[derive(Clone, Debug)]
 pub struct Frames {
     pub channels: Vec<Channel>,

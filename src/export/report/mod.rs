@@ -2,8 +2,8 @@
 //! click, without network or server.
 //!
 //! A page shows bodies in motion ([`view::View`]), charts and tables. The frames of an animation are kept
-//! while the run goes on (`frames`), at an interval that doubles when there are too many, as displacements in whole
-//! multiples of a power of two (`quantized_channel`), and written as differences, deflated (`encode`). The page
+//! while the run goes on (`recorder`, `frames`; those of a body in parts show a `sample` of it), at an interval that doubles
+//! when there are too many, as displacements in whole multiples of a power of two (`quantized_channel`), and written as differences, deflated (`encode`). The page
 //! computes PE1, strain and stress from displacements; the values at the end are written to the last bit, as in
 //! `final.csv`.
 //!
@@ -18,7 +18,9 @@ pub(crate) mod frames;
 pub mod gallery;
 pub mod page;
 pub(crate) mod quantized_channel;
+pub(in crate::export) mod recorder;
 pub mod run;
+mod sample;
 pub mod stability;
 #[cfg(feature = "fem")]
 pub mod trade;
@@ -26,7 +28,7 @@ pub mod view;
 
 #[cfg(feature = "swarm")]
 pub use flight::FlightRecorder;
-pub use run::{AnimationState, RunRecorder};
+pub use recorder::{AnimationState, RunRecorder};
 
 use encode::EncodedFrames;
 use frames::Frames;

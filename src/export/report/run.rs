@@ -1,391 +1,20 @@
 //! The report of a run: the body step by step, its probes, its summary and its scene.
 
-use std::borrow::Cow;
 use std::path::PathBuf;
 
-use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
-
-use super::super::bonds::pairs;
 use super::super::error::ExportError;
 use super::super::figures::{chart, probes};
 use super::super::load;
 use super::super::{OutputFolder, Results, Signed, Summary};
-use super::encode::GROUP;
-use super::encoded;
-use super::frames::{Channel, Frame, Frames, MOST_FRAMES};
+use super::frames::MOST_FRAMES;
 use super::page::{Page, file_texts, number};
-use super::view::{Animation, Clock, Quantity, Stress, View};
-use crate::continuum::mechanics::Stresses;
-use crate::continuum::memory::{measured, neighbour_entries};
-use crate::continuum::plan::Plan;
+use super::recorder::is_solved_at_once;
+use super::sample::stride_of;
+use super::view::{Animation, View};
 use crate::continuum::run::{Outcome, StopReason};
-use crate::engine::Engine;
-use crate::engine::serde_impls;
-use crate::flock::role::Role;
-use crate::flock::rules::{Mean, Rotation};
-use crate::flock::strain::Strain;
-use crate::material::cells::Cells;
-use crate::material::elastic::{Constants, Elastic, Plane};
-use crate::material::stress::StressState;
 use crate::scene::Scene;
 use crate::scene::text::counted;
 use crate::scene::units::Units;
-
-/// Up to so many particles everything has the bits from which the strains of a body that turns far are still
-/// exact; larger bodies have those that a screen can show.
-const MOST_FINE: usize = 20_000;
-const FINE_BITS: u32 = 24;
-const COARSE_BITS: u32 = 16;
-/// Of quantities that are shown as a colour only.
-const COLOUR_BITS: u32 = 12;
-/// Most particles whose final values are written exactly: those of more would fill the page.
-const MOST_EXACT: usize = 250_000;
-/// Frames of a body whose equilibrium was solved for, on its way from no load to all of it.
-const LOAD_FRAMES: usize = 20;
-
-/// The state of a recorder, for a checkpoint.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct AnimationState<'a> {
-    frames: Cow<'a, [Frame]>,
-    interval: usize,
-    #[serde(with = "serde_impls::roles")]
-    first_roles: Vec<Role>,
-    #[serde(with = "serde_impls::roles")]
-    roles: Vec<Role>,
-    changes: Vec<[u32; 3]>,
-}
-
-/// Values that frames hold of each particle.
-fn channels(count: usize, are_neighbours_lasting: bool) -> Vec<Channel> {
-    let [bits, others] = if count <= MOST_FINE { [FINE_BITS; 2] } else { [COARSE_BITS, COLOUR_BITS] };
-    let channel = |name, bits| Channel { name, bits };
-    let mut channels = vec![channel("dx", bits), channel("dy", bits), channel("pe2", others)];
-    // Neighbours that are found anew at every step are known to the engine alone.
-    if !are_neighbours_lasting {
-        channels.extend(["pe1", "strain"].map(|name| channel(name, others)));
-    }
-    channels
-}
-
-/// Bytes of the report of a run.
-#[derive(Clone, Copy, Debug, Default)]
-pub(in crate::export) struct Packed {
-    /// Of what a frame is taken from, until the last one is.
-    pub values: usize,
-    /// Of the frames at their most, and at the end.
-    pub frames: [usize; 2],
-    /// Of what they are packed in, with bonds and cells.
-    pub packing: usize,
-    /// Of the text, until it is written.
-    pub text: usize,
-}
-
-/// Memory that the report of a run takes, before it begins.
-pub(in crate::export) fn packed(plan: &Plan, is_solved_at_once: bool) -> Packed {
-    /// Bytes of a particle's place and neighbours as text: rows of a lattice are next to nothing.
-    const TEXT: usize = 6;
-    /// Bytes of its numbers at the end as text; where nothing has come yet, they are next to nothing too.
-    const EXACT: usize = 20;
-    const EXACT_WITH_STRESS: usize = 80;
-    let count = plan.count();
-    let frames = Frames::new(count, channels(count, plan.setup.present_radius.is_none()));
-    let steps = if is_solved_at_once { LOAD_FRAMES } else { plan.stop.steps };
-    let is_exact = count <= MOST_EXACT;
-    let exact = if is_exact { (size_of::<Option<Strain>>() + 8) * count + measured(plan) } else { 0 };
-    let text = match (is_exact, &plan.setup.cells) {
-        (false, _) => TEXT,
-        (true, None) => TEXT + EXACT,
-        (true, Some(_)) => TEXT + EXACT_WITH_STRESS,
-    };
-    let bonds = 8 * neighbour_entries(plan) / 2;
-    let kept = frames.of_steps(steps);
-    let at_once = rayon::current_num_threads().min(kept[1].div_ceil(GROUP));
-    Packed {
-        values: 8 * frames.channels.len() * count,
-        frames: kept.map(|kept| kept * frames.bytes_of_one()),
-        packing: exact.max(bonds).max((text + at_once * 4 * (2 * frames.channels.len() + 1)) * count),
-        text: text * count,
-    }
-}
-
-/// Keeps the frames of a run while it goes on.
-#[derive(Debug)]
-pub struct RunRecorder {
-    frames: Frames,
-    first_roles: Vec<Role>,
-    roles: Vec<Role>,
-    /// Step, particle and role.
-    changes: Vec<[u32; 3]>,
-    values: Vec<Vec<f64>>,
-    is_solved: bool,
-}
-
-impl RunRecorder {
-    /// From the engine before its first step.
-    fn new(engine: &Engine) -> Self {
-        let count = engine.body().count();
-        let channels = channels(count, engine.lasting_neighbours().is_some());
-        let roles = engine.roles().to_vec();
-        let values = vec![Vec::new(); channels.len()];
-        let frames = Frames::new(count, channels);
-        Self { frames, first_roles: roles.clone(), roles, changes: Vec::new(), values, is_solved: false }
-    }
-
-    /// The recorder, made if there is none yet; it goes on from the state of an earlier one.
-    pub fn open<'a>(
-        recorder: &'a mut Option<Self>,
-        earlier: &mut Option<AnimationState<'_>>,
-        engine: &Engine,
-    ) -> &'a mut Self {
-        let recorder = recorder.get_or_insert_with(|| Self::new(engine));
-        if let Some(AnimationState { frames, interval, first_roles, roles, changes }) = earlier.take() {
-            recorder.frames.resume(frames.into_owned(), interval);
-            (recorder.first_roles, recorder.roles, recorder.changes) = (first_roles, roles, changes);
-        }
-        recorder
-    }
-
-    /// Looks at a step.
-    pub fn watch(&mut self, engine: &Engine) {
-        if self.frames.wants(engine.step()) {
-            self.take(engine, 1.0);
-            self.frames.keep(engine.step(), &slices(&self.values));
-        }
-    }
-
-    /// The frames and rows so far.
-    pub fn animation_state(&self) -> AnimationState<'_> {
-        AnimationState {
-            frames: Cow::Borrowed(self.frames.kept()),
-            interval: self.frames.interval(),
-            first_roles: self.first_roles.clone(),
-            roles: self.roles.clone(),
-            changes: self.changes.clone(),
-        }
-    }
-
-    /// The next step after `step` of which a frame is kept.
-    pub fn next(&self, step: usize) -> usize {
-        self.frames.next(step)
-    }
-
-    /// The frame of the end, which is exact whatever its step; of a body that was solved for at once, the way there.
-    fn finish(&mut self, engine: &Engine, is_solved: bool) {
-        if is_solved {
-            self.frames = Frames::new(self.frames.count, self.frames.channels.clone());
-            for frame in 0..=LOAD_FRAMES {
-                self.take(engine, frame as f64 / LOAD_FRAMES as f64);
-                self.frames.keep(frame, &slices(&self.values));
-            }
-        } else {
-            self.take(engine, 1.0);
-            self.frames.keep_last(engine.step(), &slices(&self.values));
-        }
-        // Nothing is taken any more, and the page is yet to be packed.
-        self.values.iter_mut().for_each(|values| *values = Vec::new());
-    }
-
-    /// Values of every channel, displacements times `part`.
-    fn take(&mut self, engine: &Engine, part: f64) {
-        let (present, reference) = (engine.present(), &engine.body().reference);
-        let moved = |now: &[f64], then: &[f64], out: &mut Vec<f64>| {
-            out.clear();
-            out.extend(now.iter().zip(then).map(|(now, then)| part * (now - then)));
-        };
-        moved(&present.x, &reference.x, &mut self.values[0]);
-        moved(&present.y, &reference.y, &mut self.values[1]);
-        let particles = || (0..reference.len()).into_par_iter();
-        particles().map(|i| engine.pe2(i)).collect_into_vec(&mut self.values[2]);
-        if self.values.len() > 3 {
-            particles().map(|i| engine.pe1(i)).collect_into_vec(&mut self.values[3]);
-            let largest = |i| engine.strain(i).map_or(f64::NAN, |strain| strain.largest());
-            particles().map(largest).collect_into_vec(&mut self.values[4]);
-        }
-        self.take_roles(engine);
-    }
-
-    fn take_roles(&mut self, engine: &Engine) {
-        if self.roles == engine.roles() {
-            return;
-        }
-        let both = self.roles.iter().zip(engine.roles()).enumerate();
-        let step = engine.step() as u32;
-        self.changes.extend(
-            both.filter(|(_, (was, is))| was != is).map(|(i, (_, &is))| [step, i as u32, is.number().into()]),
-        );
-        self.roles.copy_from_slice(engine.roles());
-    }
-
-    /// Takes the frames of the end, after which there are no others.
-    pub fn close(&mut self, scene: &Scene, outcome: &Outcome) {
-        self.is_solved = is_solved_at_once(scene, outcome);
-        self.finish(&outcome.engine, self.is_solved);
-    }
-
-    /// The animation of a run that is closed; of frames that are too many for a page half are let go.
-    pub fn stage(&mut self, scene: &Scene, outcome: &Outcome) -> View {
-        let (engine, is_solved) = (&outcome.engine, self.is_solved);
-        self.view(scene, engine, is_solved, engine.body().count() <= MOST_EXACT)
-    }
-
-    pub(in crate::export) fn frames(&self) -> &[Frame] {
-        self.frames.kept()
-    }
-
-    /// Whether the frames are parts of the way to a rest that was solved for.
-    pub(in crate::export) fn is_solved(&self) -> bool {
-        self.is_solved
-    }
-
-    /// The part of the load at a frame, if frames are parts of it.
-    pub(in crate::export) fn part_of_load(&self, frame: usize) -> Option<f64> {
-        self.is_solved.then_some(frame as f64 / LOAD_FRAMES as f64)
-    }
-
-    pub(in crate::export) fn roles_at(&self, step: usize) -> Vec<Role> {
-        let mut roles = self.first_roles.clone();
-        for &[_, particle, role] in
-            self.changes.iter().filter(|[at, ..]| self.is_solved || *at as usize <= step)
-        {
-            roles[particle as usize] = Role::ALL[role as usize];
-        }
-        roles
-    }
-
-    /// A body as it is, in a single frame.
-    #[cfg(feature = "live")]
-    pub(crate) fn still(scene: &Scene, engine: &Engine) -> View {
-        let mut recorder = Self::new(engine);
-        recorder.finish(engine, false);
-        recorder.view(scene, engine, false, false)
-    }
-
-    fn view(&mut self, scene: &Scene, engine: &Engine, is_solved: bool, is_exact: bool) -> View {
-        let mut stage = View::new(animation(scene, engine, is_solved));
-        stage.set_reference(&engine.body().reference);
-        stage.set_roles(&self.first_roles, &self.changes);
-        if let Some(numbering) = &engine.body().numbering {
-            stage.set_ids((0..engine.body().count()).map(|i| numbering.id(i)));
-        }
-        // Where neighbours change, bonds and cells would be those of the start.
-        if engine.lasting_neighbours().is_some() {
-            set_bonds(&mut stage, engine, is_solved);
-            let cells =
-                engine.cells().map_or_else(|| Cow::Owned(Cells::of_body(engine.body())), Cow::Borrowed);
-            if cells.count() > 0 {
-                stage.set_cells(&cells);
-            }
-        }
-        if is_exact {
-            add_exact(&mut stage, scene, engine);
-        }
-        let encoded = encoded(&mut self.frames, stage.size());
-        let steps = self.frames.kept().iter().map(|frame| frame.step as f64);
-        let times = match is_solved {
-            true => steps.map(|step| 100.0 * step / LOAD_FRAMES as f64).collect(),
-            false => steps.collect(),
-        };
-        stage.set_frames(&self.frames, encoded, times);
-        stage
-    }
-}
-
-fn slices(values: &[Vec<f64>]) -> Vec<&[f64]> {
-    values.iter().map(Vec::as_slice).collect()
-}
-
-/// Whether the equilibrium was found without intermediate states.
-fn is_solved_at_once(scene: &Scene, outcome: &Outcome) -> bool {
-    outcome.solved.is_some() && scene.load_steps.is_none()
-}
-
-fn animation(scene: &Scene, engine: &Engine, is_solved: bool) -> Animation {
-    let unit = scene.unit();
-    let mut quantities =
-        vec![Quantity::new("pe1", "PE1", format!("{unit}²")), Quantity::new("pe2", "PE2", unit)];
-    // The page has one material for all particles; of inclusions it shows the stress at the end alone.
-    let elastic = scene.material.as_ref().filter(|_| scene.inclusions.is_empty());
-    let stress = elastic.map(|elastic| stress(elastic, scene.mean));
-    // At rest nothing moves.
-    quantities.retain(|quantity| quantity.key != "pe2" || !is_solved);
-    if stress.is_some() {
-        quantities.push(Quantity::new("von_mises", "von Mises stress", Units::of(scene).stress));
-    }
-    quantities.push(Quantity::new("strain", "largest strain", ""));
-    let clock = match is_solved {
-        true => Clock { quantity: "load", unit: "%" },
-        false => Clock { quantity: scene.counts(), unit: "" },
-    };
-    Animation {
-        noun: "particle",
-        unit: unit.into(),
-        clock,
-        spacing: engine.body().lattice.spacing(),
-        quantities,
-        linear: stress.as_ref().is_some_and(|stress| stress.linear) && scene.fracture.is_none(),
-        stress,
-        ..Animation::default()
-    }
-}
-
-fn stress(elastic: &Elastic, mean: Mean) -> Stress {
-    let unit = |k: usize| elastic.stress([0, 1, 2].map(|axis| f64::from(u8::from(axis == k))));
-    let columns = [unit(0), unit(1), unit(2)];
-    let across = match elastic.constants() {
-        Constants::Isotropic { poisson, plane: Plane::Strain, .. } => poisson,
-        _ => 0.0,
-    };
-    let linear = !matches!(mean, Mean::Material { rotation: Rotation::Corotated });
-    Stress { stiffness: [0, 1, 2].map(|row| [0, 1, 2].map(|k| columns[k][row])), across, linear }
-}
-
-/// Every bond with the step at which it broke; a bond without one lives.
-fn set_bonds(stage: &mut View, engine: &Engine, is_solved: bool) {
-    let neighbours = &engine.flock().neighbours;
-    let mut breaks: Vec<([u32; 2], u32)> =
-        engine.breaks().iter().map(|one| (one.pair, one.step as u32 + 1)).collect();
-    breaks.sort_unstable();
-    let all: Vec<[u32; 2]> = pairs(neighbours).collect();
-    let sees = all.iter().map(|&[a, b]| u32::from(!neighbours.of(b as usize).contains(&a)));
-    let broken = all.iter().map(|&[a, b]| {
-        let found = breaks.binary_search_by_key(&[a.min(b), a.max(b)], |one| one.0);
-        // Bonds that are broken at rest were broken before the load.
-        found.map_or(0, |n| if is_solved { 1 } else { breaks[n].1 })
-    });
-    stage.set_bonds(&all, sees, broken);
-}
-
-/// The columns of `final.csv`.
-fn add_exact(stage: &mut View, scene: &Scene, engine: &Engine) {
-    let strains: Vec<Option<Strain>> =
-        (0..engine.body().count()).into_par_iter().map(|i| engine.strain(i)).collect();
-    let unit = scene.unit();
-    let mut add = |key: &str, label: &str, unit: &str, values: &mut dyn Iterator<Item = f64>| {
-        stage.add_exact(Quantity::new(key, label, unit), values);
-    };
-    let all = || 0..engine.body().count();
-    add("x", "x", unit, &mut engine.present().x.iter().copied());
-    add("y", "y", unit, &mut engine.present().y.iter().copied());
-    add("pe1", "PE1", &format!("{unit}²"), &mut all().map(|i| engine.pe1(i)));
-    add("pe2", "PE2", unit, &mut all().map(|i| engine.pe2(i)));
-    for (k, name) in ["xx", "yy", "xy"].into_iter().enumerate() {
-        let component = |strain: &Option<Strain>| strain.map_or(f64::NAN, |strain| strain.components[k]);
-        add(&format!("strain_{name}"), &format!("strain {name}"), "", &mut strains.iter().map(component));
-    }
-    let rotation = |strain: &Option<Strain>| strain.map_or(f64::NAN, |strain| strain.rotation);
-    add("rotation", "rotation", "rad", &mut strains.iter().map(rotation));
-    if let Some(Stresses { particles, .. }) = Stresses::at_present(engine) {
-        let unit = Units::of(scene).stress;
-        let of = |number: fn(&StressState) -> f64| {
-            particles.iter().map(move |stress| stress.as_ref().map_or(f64::NAN, number))
-        };
-        add("stress_xx", "stress xx", &unit, &mut of(|stress| stress.components[0]));
-        add("stress_yy", "stress yy", &unit, &mut of(|stress| stress.components[1]));
-        add("stress_xy", "stress xy", &unit, &mut of(|stress| stress.components[2]));
-        add("von_mises", "von Mises stress", &unit, &mut of(|stress| stress.von_mises));
-    }
-}
 
 /// Writes `report.html`.
 ///
@@ -434,7 +63,11 @@ fn verdict(outcome: &Outcome, summary: &Summary) -> (bool, String) {
 fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
     let frames = animation.times.len();
     let bits = animation.channels.first().map_or(0, |channel| channel.bits);
-    let mut note = if is_solved {
+    let body = outcome.engine.body();
+    let is_sample = body.part.is_some();
+    let mut note = if is_solved && is_sample {
+        "Solved for its rest, not stepped: the rest alone is shown.".to_owned()
+    } else if is_solved {
         format!(
             "Solved for its rest, not stepped: {frames} frames in equal increments of the displacement, as under a load that grows evenly."
         )
@@ -452,6 +85,15 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
     };
     if let Some(first) = animation.times.first().filter(|&&first| first > 0.0 && !is_solved) {
         note += &format!(" This run was resumed at step {first}; earlier steps are not shown.");
+    }
+    if is_sample {
+        note += &format!(
+            " Ranks had a part of the body each: {} of its {} particles are shown, one of {} along either axis of the lattice, without bonds and cells. All values are kept to {bits} bits of each frame's range, or fewer.",
+            animation.count,
+            body.total(),
+            stride_of(body.total()),
+        );
+        return note + " final.csv has all of them, to the last digit.";
     }
     note += &format!(
         " Displacements are kept to {bits} bits of each frame's range; PE1, strain and stress are computed from them."

@@ -1,0 +1,451 @@
+//! The frames of a run, kept while it goes on, and the view of the body that they make.
+
+use std::borrow::Cow;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::super::bonds::pairs;
+use super::encode::GROUP;
+use super::encoded;
+use super::frames::{Channel, Frame, Frames};
+use super::sample::{self, Sample};
+use super::view::{Animation, Clock, Quantity, Stress, View};
+use crate::continuum::mechanics::Stresses;
+use crate::continuum::memory::{measured, neighbour_entries};
+use crate::continuum::plan::Plan;
+use crate::continuum::run::Outcome;
+use crate::engine::Engine;
+use crate::engine::serde_impls;
+use crate::flock::role::Role;
+use crate::flock::rules::{Mean, Rotation};
+use crate::flock::strain::Strain;
+use crate::material::cells::Cells;
+use crate::material::elastic::{Constants, Elastic, Plane};
+use crate::material::stress::StressState;
+use crate::scene::Scene;
+use crate::scene::units::Units;
+
+/// Up to so many particles everything has the bits from which the strains of a body that turns far are still
+/// exact; larger bodies have those that a screen can show.
+const MOST_FINE: usize = 20_000;
+const FINE_BITS: u32 = 24;
+const COARSE_BITS: u32 = 16;
+/// Of quantities that are shown as a colour only.
+const COLOUR_BITS: u32 = 12;
+/// Most particles whose final values are written exactly: those of more would fill the page.
+const MOST_EXACT: usize = 250_000;
+/// Frames of a body whose equilibrium was solved for, on its way from no load to all of it.
+const LOAD_FRAMES: usize = 20;
+
+/// The state of a recorder, for a checkpoint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AnimationState<'a> {
+    frames: Cow<'a, [Frame]>,
+    interval: usize,
+    #[serde(with = "serde_impls::roles")]
+    first_roles: Vec<Role>,
+    #[serde(with = "serde_impls::roles")]
+    roles: Vec<Role>,
+    changes: Vec<[u32; 3]>,
+    /// Of so many particles along either axis of the lattice of a body in parts one was shown.
+    stride: Option<usize>,
+}
+
+/// Values that frames hold of each particle, of a body of so many.
+fn channels(total: usize, are_neighbours_known: bool, has_stresses: bool) -> Vec<Channel> {
+    let [bits, others] = if total <= MOST_FINE { [FINE_BITS; 2] } else { [COARSE_BITS, COLOUR_BITS] };
+    let channel = |name, bits| Channel { name, bits };
+    let mut channels = vec![channel("dx", bits), channel("dy", bits), channel("pe2", others)];
+    // Neighbours that are found anew at every step, or are not in a sample, are known to the engine alone.
+    if !are_neighbours_known {
+        channels.extend(["pe1", "strain"].map(|name| channel(name, others)));
+        channels.extend(has_stresses.then(|| channel(VON_MISES, others)));
+    }
+    channels
+}
+
+/// Bytes of the report of a run.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::export) struct Packed {
+    /// Of what a frame is taken from, until the last one is.
+    pub values: usize,
+    /// Of the frames at their most, and at the end.
+    pub frames: [usize; 2],
+    /// Of what they are packed in, with bonds and cells.
+    pub packing: usize,
+    /// Of the text, until it is written.
+    pub text: usize,
+}
+
+/// Memory that the report of a run takes, before it begins.
+pub(in crate::export) fn packed(plan: &Plan, is_solved_at_once: bool) -> Packed {
+    /// Bytes of a particle's place and neighbours as text: rows of a lattice are next to nothing.
+    const TEXT: usize = 6;
+    /// Bytes of its numbers at the end as text; where nothing has come yet, they are next to nothing too.
+    const EXACT: usize = 20;
+    const EXACT_WITH_STRESS: usize = 80;
+    let (total, is_sample) = (plan.setup.body.total(), plan.setup.body.part.is_some());
+    let count = if is_sample { sample::size_of(total) } else { total };
+    let are_neighbours_known = !is_sample && plan.setup.present_radius.is_none();
+    let frames = Frames::new(count, channels(total, are_neighbours_known, plan.setup.cells.is_some()));
+    let steps = match (is_solved_at_once, is_sample) {
+        (true, true) => 0,
+        (true, false) => LOAD_FRAMES,
+        _ => plan.stop.steps,
+    };
+    let is_exact = !is_sample && count <= MOST_EXACT;
+    let exact = if is_exact { (size_of::<Option<Strain>>() + 8) * count + measured(plan) } else { 0 };
+    let text = match (is_exact, &plan.setup.cells) {
+        (false, _) => TEXT,
+        (true, None) => TEXT + EXACT,
+        (true, Some(_)) => TEXT + EXACT_WITH_STRESS,
+    };
+    let bonds = if is_sample { 0 } else { 8 * neighbour_entries(plan) / 2 };
+    let kept = frames.of_steps(steps);
+    let at_once = rayon::current_num_threads().min(kept[1].div_ceil(GROUP));
+    Packed {
+        values: 8 * frames.channels.len() * count,
+        frames: kept.map(|kept| kept * frames.bytes_of_one()),
+        packing: exact.max(bonds).max((text + at_once * 4 * (2 * frames.channels.len() + 1)) * count),
+        text: text * count,
+    }
+}
+
+/// Keeps the frames of a run while it goes on.
+#[derive(Debug)]
+pub struct RunRecorder {
+    frames: Frames,
+    first_roles: Vec<Role>,
+    roles: Vec<Role>,
+    /// Step, particle and role.
+    changes: Vec<[u32; 3]>,
+    values: Vec<Vec<f64>>,
+    is_solved: bool,
+    /// The particles that are shown of a body in parts.
+    sample: Option<Sample>,
+}
+
+impl RunRecorder {
+    /// From the engine before its first step.
+    fn new(engine: &Engine) -> Self {
+        let sample = Sample::of(engine);
+        let count = sample.as_ref().map_or(engine.body().count(), Sample::count);
+        let are_neighbours_known = sample.is_none() && engine.lasting_neighbours().is_some();
+        let channels = channels(engine.body().total(), are_neighbours_known, engine.cells().is_some());
+        let roles = roles(engine, sample.as_ref()).into_owned();
+        let values = vec![Vec::new(); channels.len()];
+        let frames = Frames::new(count, channels);
+        let first_roles = roles.clone();
+        Self { frames, first_roles, roles, changes: Vec::new(), values, is_solved: false, sample }
+    }
+
+    /// The recorder, made if there is none yet; it goes on from the state of an earlier one that showed the same particles.
+    pub fn open<'a>(
+        recorder: &'a mut Option<Self>,
+        earlier: &mut Option<AnimationState<'_>>,
+        engine: &Engine,
+    ) -> &'a mut Self {
+        let recorder = recorder.get_or_insert_with(|| Self::new(engine));
+        let earlier = earlier.take().filter(|earlier| earlier.stride == recorder.stride());
+        if let Some(AnimationState { frames, interval, first_roles, roles, changes, .. }) = earlier {
+            let mut frames = frames.into_owned();
+            if recorder.sample.as_ref().is_some_and(|sample| !sample.is_received()) {
+                frames.iter_mut().for_each(Frame::clear);
+            } else {
+                (recorder.first_roles, recorder.roles, recorder.changes) = (first_roles, roles, changes);
+            }
+            recorder.frames.resume(frames, interval);
+        }
+        recorder
+    }
+
+    /// Looks at a step.
+    pub fn watch(&mut self, engine: &Engine) {
+        if self.frames.wants(engine.step()) {
+            self.take(engine, 1.0);
+            self.frames.keep(engine.step(), &slices(&self.values));
+        }
+    }
+
+    /// The frames and rows so far.
+    pub fn animation_state(&self) -> AnimationState<'_> {
+        AnimationState {
+            frames: Cow::Borrowed(self.frames.kept()),
+            interval: self.frames.interval(),
+            first_roles: self.first_roles.clone(),
+            roles: self.roles.clone(),
+            changes: self.changes.clone(),
+            stride: self.stride(),
+        }
+    }
+
+    /// Of so many particles along either axis of the lattice of a body in parts one is shown.
+    fn stride(&self) -> Option<usize> {
+        self.sample.as_ref().map(Sample::stride)
+    }
+
+    /// The next step after `step` of which a frame is kept.
+    pub fn next(&self, step: usize) -> usize {
+        self.frames.next(step)
+    }
+
+    /// The frame of the end, which is exact whatever its step; of a body that was solved for at once, the way there.
+    fn finish(&mut self, engine: &Engine, is_solved: bool) {
+        if is_solved {
+            self.frames = Frames::new(self.frames.count, self.frames.channels.clone());
+            // What the page does not compute is known of the whole load.
+            let first = if self.sample.is_some() { LOAD_FRAMES } else { 0 };
+            for frame in first..=LOAD_FRAMES {
+                self.take(engine, frame as f64 / LOAD_FRAMES as f64);
+                self.frames.keep(frame, &slices(&self.values));
+            }
+        } else {
+            self.take(engine, 1.0);
+            self.frames.keep_last(engine.step(), &slices(&self.values));
+        }
+        // Nothing is taken any more, and the page is yet to be packed.
+        self.values.iter_mut().for_each(|values| *values = Vec::new());
+    }
+
+    /// Values of every channel, displacements times `part`.
+    fn take(&mut self, engine: &Engine, part: f64) {
+        let (present, reference, sample) = (engine.present(), &engine.body().reference, &self.sample);
+        let take = |values: &mut Vec<f64>, of: &(dyn Fn(usize) -> f64 + Sync)| match sample {
+            None => (0..reference.len()).into_par_iter().map(of).collect_into_vec(values),
+            Some(sample) => *values = sample.numbers(of),
+        };
+        let [dx, dy, pe2, others @ ..] = &mut self.values[..] else {
+            unreachable!("there are three or more")
+        };
+        take(dx, &|i| part * (present.x[i] - reference.x[i]));
+        take(dy, &|i| part * (present.y[i] - reference.y[i]));
+        take(pe2, &|i| engine.pe2(i));
+        if let [pe1, strain, of_cells @ ..] = others {
+            take(pe1, &|i| engine.pe1(i));
+            take(strain, &|i| engine.strain(i).map_or(f64::NAN, |strain| strain.largest()));
+            if let [von_mises] = of_cells {
+                let particles =
+                    Stresses::at_present(engine).map_or_else(Vec::new, |stresses| stresses.particles);
+                let of = |i: usize| Some(particles.get(i)?.as_ref()?.von_mises);
+                take(von_mises, &|i| of(i).unwrap_or(f64::NAN));
+            }
+        }
+        self.take_roles(engine);
+    }
+
+    fn take_roles(&mut self, engine: &Engine) {
+        let now = roles(engine, self.sample.as_ref());
+        if self.roles == *now {
+            return;
+        }
+        let both = self.roles.iter().zip(now.iter()).enumerate();
+        let step = engine.step() as u32;
+        self.changes.extend(
+            both.filter(|(_, (was, is))| was != is).map(|(i, (_, &is))| [step, i as u32, is.number().into()]),
+        );
+        self.roles.copy_from_slice(&now);
+    }
+
+    /// Takes the frames of the end, after which there are no others.
+    pub fn close(&mut self, scene: &Scene, outcome: &Outcome) {
+        self.is_solved = is_solved_at_once(scene, outcome);
+        self.finish(&outcome.engine, self.is_solved);
+    }
+
+    /// The animation of a run that is closed, for the rank that writes; of frames that are too many for a page half are let go.
+    pub fn stage(&mut self, scene: &Scene, outcome: &Outcome) -> View {
+        let (engine, is_solved) = (&outcome.engine, self.is_solved);
+        self.view(scene, engine, is_solved, engine.body().count() <= MOST_EXACT)
+    }
+
+    #[cfg(test)]
+    pub(super) fn sample(&self) -> Option<&Sample> {
+        self.sample.as_ref()
+    }
+
+    pub(in crate::export) fn frames(&self) -> &[Frame] {
+        self.frames.kept()
+    }
+
+    /// Whether the frames are parts of the way to a rest that was solved for.
+    pub(in crate::export) fn is_solved(&self) -> bool {
+        self.is_solved
+    }
+
+    /// The part of the load at a frame, if frames are parts of it.
+    pub(in crate::export) fn part_of_load(&self, frame: usize) -> Option<f64> {
+        self.is_solved.then_some(frame as f64 / LOAD_FRAMES as f64)
+    }
+
+    pub(in crate::export) fn roles_at(&self, step: usize) -> Vec<Role> {
+        let mut roles = self.first_roles.clone();
+        for &[_, particle, role] in
+            self.changes.iter().filter(|[at, ..]| self.is_solved || *at as usize <= step)
+        {
+            roles[particle as usize] = Role::ALL[role as usize];
+        }
+        roles
+    }
+
+    /// A body as it is, in a single frame.
+    #[cfg(feature = "live")]
+    pub(crate) fn still(scene: &Scene, engine: &Engine) -> View {
+        let mut recorder = Self::new(engine);
+        recorder.finish(engine, false);
+        recorder.view(scene, engine, false, false)
+    }
+
+    fn view(&mut self, scene: &Scene, engine: &Engine, is_solved: bool, is_exact: bool) -> View {
+        let mut stage = View::new(animation(scene, engine, is_solved));
+        stage.set_roles(&self.first_roles, &self.changes);
+        if let Some(sample) = &self.sample {
+            stage.set_reference(&sample.reference);
+            stage.set_ids(sample.ids.iter().copied());
+            // A dot stands for those around it as well.
+            stage.animation.spacing *= sample.stride() as f64;
+            let is_stress = |channel: &Channel| channel.name == VON_MISES;
+            if self.frames.channels.iter().any(is_stress) {
+                let quantities = &mut stage.animation.quantities;
+                quantities.retain(|quantity| quantity.key != VON_MISES);
+                quantities.push(von_mises(scene));
+            }
+        } else {
+            stage.set_reference(&engine.body().reference);
+            if let Some(numbering) = &engine.body().numbering {
+                stage.set_ids((0..engine.body().count()).map(|i| numbering.id(i)));
+            }
+        }
+        // Where neighbours change, bonds and cells would be those of the start.
+        if self.sample.is_none() && engine.lasting_neighbours().is_some() {
+            set_bonds(&mut stage, engine, is_solved);
+            let cells =
+                engine.cells().map_or_else(|| Cow::Owned(Cells::of_body(engine.body())), Cow::Borrowed);
+            if cells.count() > 0 {
+                stage.set_cells(&cells);
+            }
+        }
+        if is_exact && self.sample.is_none() {
+            add_exact(&mut stage, scene, engine);
+        }
+        let encoded = encoded(&mut self.frames, stage.size());
+        let steps = self.frames.kept().iter().map(|frame| frame.step as f64);
+        let times = match is_solved {
+            true => steps.map(|step| 100.0 * step / LOAD_FRAMES as f64).collect(),
+            false => steps.collect(),
+        };
+        stage.set_frames(&self.frames, encoded, times);
+        stage
+    }
+}
+
+/// The roles of the particles that are shown.
+fn roles<'a>(engine: &'a Engine, sample: Option<&Sample>) -> Cow<'a, [Role]> {
+    let of_sample = |sample: &Sample| {
+        let numbers = sample.words(|i| engine.roles()[i].number().into());
+        numbers.into_iter().map(|number| Role::ALL[number as usize]).collect()
+    };
+    sample.map_or(Cow::Borrowed(engine.roles()), |sample| Cow::Owned(of_sample(sample)))
+}
+
+fn slices(values: &[Vec<f64>]) -> Vec<&[f64]> {
+    values.iter().map(Vec::as_slice).collect()
+}
+
+/// Whether the equilibrium was found without intermediate states.
+pub(super) fn is_solved_at_once(scene: &Scene, outcome: &Outcome) -> bool {
+    outcome.solved.is_some() && scene.load_steps.is_none()
+}
+
+fn animation(scene: &Scene, engine: &Engine, is_solved: bool) -> Animation {
+    let unit = scene.unit();
+    let mut quantities =
+        vec![Quantity::new("pe1", "PE1", format!("{unit}²")), Quantity::new("pe2", "PE2", unit)];
+    // The page has one material for all particles; of inclusions it shows the stress at the end alone.
+    let elastic = scene.material.as_ref().filter(|_| scene.inclusions.is_empty());
+    let stress = elastic.map(|elastic| stress(elastic, scene.mean));
+    // At rest nothing moves.
+    quantities.retain(|quantity| quantity.key != "pe2" || !is_solved);
+    if stress.is_some() {
+        quantities.push(von_mises(scene));
+    }
+    quantities.push(Quantity::new("strain", "largest strain", ""));
+    let clock = match is_solved {
+        true => Clock { quantity: "load", unit: "%" },
+        false => Clock { quantity: scene.counts(), unit: "" },
+    };
+    Animation {
+        noun: "particle",
+        unit: unit.into(),
+        clock,
+        spacing: engine.body().lattice.spacing(),
+        quantities,
+        linear: stress.as_ref().is_some_and(|stress| stress.linear) && scene.fracture.is_none(),
+        stress,
+        ..Animation::default()
+    }
+}
+
+const VON_MISES: &str = "von_mises";
+
+fn von_mises(scene: &Scene) -> Quantity {
+    Quantity::new(VON_MISES, "von Mises stress", Units::of(scene).stress)
+}
+
+fn stress(elastic: &Elastic, mean: Mean) -> Stress {
+    let unit = |k: usize| elastic.stress([0, 1, 2].map(|axis| f64::from(u8::from(axis == k))));
+    let columns = [unit(0), unit(1), unit(2)];
+    let across = match elastic.constants() {
+        Constants::Isotropic { poisson, plane: Plane::Strain, .. } => poisson,
+        _ => 0.0,
+    };
+    let linear = !matches!(mean, Mean::Material { rotation: Rotation::Corotated });
+    Stress { stiffness: [0, 1, 2].map(|row| [0, 1, 2].map(|k| columns[k][row])), across, linear }
+}
+
+/// Every bond with the step at which it broke; a bond without one lives.
+fn set_bonds(stage: &mut View, engine: &Engine, is_solved: bool) {
+    let neighbours = &engine.flock().neighbours;
+    let mut breaks: Vec<([u32; 2], u32)> =
+        engine.breaks().iter().map(|one| (one.pair, one.step as u32 + 1)).collect();
+    breaks.sort_unstable();
+    let all: Vec<[u32; 2]> = pairs(neighbours).collect();
+    let sees = all.iter().map(|&[a, b]| u32::from(!neighbours.of(b as usize).contains(&a)));
+    let broken = all.iter().map(|&[a, b]| {
+        let found = breaks.binary_search_by_key(&[a.min(b), a.max(b)], |one| one.0);
+        // Bonds that are broken at rest were broken before the load.
+        found.map_or(0, |n| if is_solved { 1 } else { breaks[n].1 })
+    });
+    stage.set_bonds(&all, sees, broken);
+}
+
+/// The columns of `final.csv`.
+fn add_exact(stage: &mut View, scene: &Scene, engine: &Engine) {
+    let strains: Vec<Option<Strain>> =
+        (0..engine.body().count()).into_par_iter().map(|i| engine.strain(i)).collect();
+    let unit = scene.unit();
+    let mut add = |key: &str, label: &str, unit: &str, values: &mut dyn Iterator<Item = f64>| {
+        stage.add_exact(Quantity::new(key, label, unit), values);
+    };
+    let all = || 0..engine.body().count();
+    add("x", "x", unit, &mut engine.present().x.iter().copied());
+    add("y", "y", unit, &mut engine.present().y.iter().copied());
+    add("pe1", "PE1", &format!("{unit}²"), &mut all().map(|i| engine.pe1(i)));
+    add("pe2", "PE2", unit, &mut all().map(|i| engine.pe2(i)));
+    for (k, name) in ["xx", "yy", "xy"].into_iter().enumerate() {
+        let component = |strain: &Option<Strain>| strain.map_or(f64::NAN, |strain| strain.components[k]);
+        add(&format!("strain_{name}"), &format!("strain {name}"), "", &mut strains.iter().map(component));
+    }
+    let rotation = |strain: &Option<Strain>| strain.map_or(f64::NAN, |strain| strain.rotation);
+    add("rotation", "rotation", "rad", &mut strains.iter().map(rotation));
+    if let Some(Stresses { particles, .. }) = Stresses::at_present(engine) {
+        let unit = Units::of(scene).stress;
+        let of = |number: fn(&StressState) -> f64| {
+            particles.iter().map(move |stress| stress.as_ref().map_or(f64::NAN, number))
+        };
+        add("stress_xx", "stress xx", &unit, &mut of(|stress| stress.components[0]));
+        add("stress_yy", "stress yy", &unit, &mut of(|stress| stress.components[1]));
+        add("stress_xy", "stress xy", &unit, &mut of(|stress| stress.components[2]));
+        add(VON_MISES, "von Mises stress", &unit, &mut of(|stress| stress.von_mises));
+    }
+}
