@@ -7,7 +7,7 @@ use flockform::export::OutputFolder;
 use flockform::record::Shared;
 use flockform::record::{About, RecordError, Recording};
 
-use super::Refusal;
+use super::{Refusal, interrupt};
 
 #[derive(Debug, Args)]
 pub struct RecordArguments {
@@ -32,17 +32,24 @@ impl RecordArguments {
         if let (Some(path), Some(results)) = (&self.record, results) {
             results.require_outside(path)?;
         }
-        Ok(self.open(about, force, 1)?)
+        let recording = self.create(about, force, 1)?;
+        // An end that keeps no results keeps no part of their recording either.
+        interrupt::removes(recording.iter().map(|recording| recording.part().to_owned()));
+        Ok(recording.map(Shared::new))
     }
 
     /// The same beside nothing. A process that goes on where another ended leaves that one's file (`.mcap.part`) and writes
     /// FILE.2.mcap, and so on.
     pub fn open(&self, about: &About, force: bool, life: u32) -> Result<Option<Shared>, RecordError> {
+        Ok(self.create(about, force, life)?.map(Shared::new))
+    }
+
+    fn create(&self, about: &About, force: bool, life: u32) -> Result<Option<Recording>, RecordError> {
         let path = self.record.as_ref().map(|path| match life {
             1 => path.clone(),
             _ => path.with_extension(format!("{life}.mcap")),
         });
-        Ok(path.map(|path| Recording::create(&path, about, force)).transpose()?.map(Shared::new))
+        path.map(|path| Recording::create(&path, about, force)).transpose()
     }
 
     /// Refuses a recording of what has none.

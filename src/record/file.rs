@@ -82,6 +82,11 @@ impl Recording {
         Ok(Self { path, part, force, writer, channels, span, failure: None, messages: 0 })
     }
 
+    /// The file that is written, until it is whole.
+    pub fn part(&self) -> &Path {
+        &self.part
+    }
+
     /// Adds a message. After one that cannot be written no other is tried: [`Recording::finish`] says why.
     pub fn write(&mut self, taped: &RecordedMessage<'_>) {
         if self.failure.is_some() {

@@ -22,7 +22,8 @@ use crate::messages::names::Names;
 use crate::messages::recorder::{parameters, set_parameter};
 use crate::messages::std_msgs::Header;
 use crate::scene::swarm::Swarm;
-use crate::swarm::control::{Control, ControlSnapshot, scope};
+use crate::swarm::control::scope::NodeScope;
+use crate::swarm::control::{Control, ControlSnapshot};
 use crate::swarm::flight::{FlightCommand, commands};
 use crate::swarm::watch::Range;
 
@@ -196,8 +197,7 @@ impl Replay {
         let before = flown.as_ref().map_or_else(|| Ok(control.clone()), Control::new)?;
         let count = control.formation().count();
         let member = described.metadata.get("member").and_then(|name| control.formation().number(name));
-        let heard_of = member.map_or((0..count).collect(), |m| scope::heard(swarm, &control, m));
-        control.listen_to(&heard_of);
+        let heard_of = NodeScope::restrict(swarm, &mut control, member).heard;
         control.set_active(false);
         let fleet = described.metadata.get("namespace").map_or("/", String::as_str);
         let mut names = Names::new(NAME, fleet, &[])?;

@@ -11,7 +11,7 @@ use flockform::ros::edge::Quality;
 use flockform::ros::edge::parameters::Value;
 use flockform::ros::node::FormationNode;
 use flockform::ros::robots::{Layout, RobotNodes};
-use flockform::swarm::control::Mode;
+use flockform::swarm::control::{Control, Mode};
 use ros2_client::ServiceMapping;
 
 use super::formation::{PATIENT, Swarming, arguments, ask, change, square};
@@ -152,6 +152,30 @@ fn a_recording_of_a_process_that_goes_on_where_another_ended_replays_to_the_bit(
     let report = replay_file(&path, Some(file), &[], 0.0).expect("readable");
     assert!(report.holds(), "{:?}", report.robots);
     assert!(report.robots.iter().all(|robot| robot.recorded > 20), "{:?}", report.robots);
+}
+
+#[test]
+fn a_recording_of_the_node_of_one_robot_replays_to_the_bit() {
+    let _peers = peers();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("flight.mcap");
+    // They are sent through each other, so that it counts whose targets a node knows.
+    let legs = "manoeuvres[0].legs=[{ seconds = 2.0, rotate = 90.0 }]";
+    let near = "limits.clearance=0.6";
+    let file = square(&[&PATIENT[..], &[legs, near]].concat());
+    let names = Control::new(&file).expect("valid").formation().names.clone();
+    let member = names.last().cloned();
+    let about = About { source: "node", member: member.clone(), ..About::default() };
+    let recording = Shared::new(Recording::create(&path, &about, false).expect("writable"));
+    let mut swarm = Swarming::open_for(&file, &[], member.as_deref());
+    swarm.node.record(recording.sink()).expect("named");
+    swarm.until_all_are_heard();
+    swarm.fly_until("it is under way", |swarm| swarm.node.control().program_time() > 1.5);
+    drop(swarm);
+    recording.take().expect("open").finish().expect("whole");
+    let report = replay_file(&path, Some(file), &[], 0.0).expect("readable");
+    assert!(report.holds(), "{:?}", report.robots);
+    assert!(report.robots[names.len() - 1].recorded > 20, "{:?}", report.robots);
 }
 
 /// Words of the refusal of a topic with two uses.

@@ -50,9 +50,14 @@ pub const PATIENT: [&str; 4] =
 
 impl Swarming {
     pub fn open(swarm: &Swarm, more: &[&str]) -> Self {
+        Self::open_for(swarm, more, None)
+    }
+
+    /// With the node of one robot.
+    pub fn open_for(swarm: &Swarm, more: &[&str], member: Option<&str>) -> Self {
         Self {
             robots: RobotNodes::open(swarm, &arguments(&[]), Layout::OneNode).expect("robots"),
-            node: FormationNode::open(swarm, &arguments(more), None).expect("a node"),
+            node: FormationNode::open(swarm, &arguments(more), member).expect("a node"),
         }
     }
 

@@ -208,6 +208,37 @@ fn noise_does_not_bring_robots_that_brake_nearer_than_declared_bit_by_bit() {
     }
 }
 
+/// Two press a third against a post: it has no place that would be far enough from all, with what their noise asks for.
+#[test]
+fn noise_does_not_move_a_robot_that_is_hemmed_in_into_what_it_is_pressed_against() {
+    let to = |name: &str, at: f64, displacement: [f64; 2]| {
+        format!(
+            "{{ robots = [\"{name}\"], program = {{ kind = \"path\", points = [{{ at = {at}, displacement = {displacement:?} }}] }} }}"
+        )
+    };
+    let text = format!(
+        "title = \"pressed\"\nradius = 0.3\nlinks = {{ kind = \"nearest\", count = 2 }}\n\
+         obstacles = [{{ kind = \"disc\", centre = [0.0, 0.0], radius = 0.7 }}]\n\
+         robots = [{{ name = \"m\", place = [2.0, 0.0] }}, {{ name = \"u\", place = [4.0, 1.2] }}, {{ name = \"v\", place = [4.0, -1.2] }}]\n\
+         leaders = [{}, {}, {}]\nlimits = {{ speed = 1.0, clearance = 0.2 }}\ncontrol = {{ period = 0.1 }}\n",
+        to("m", 3.0, [-4.0, 0.0]),
+        to("u", 4.0, [-6.0, -1.2]),
+        to("v", 4.0, [-6.0, 1.2]),
+    );
+    for (model, limit) in [(SINGLE, f64::INFINITY), (SINGLE, 2.0), (IDEAL, 2.0), (UNICYCLE, f64::INFINITY)] {
+        for seed in [1, 2, 3, 7, 10] {
+            let mut set =
+                vec![format!("flight={{ duration = 60.0, model = {model}, noise = 0.02, seed = {seed} }}")];
+            set.extend(limit.is_finite().then(|| format!("limits.acceleration={limit}")));
+            let swarm = Swarm::parse("pressed", "pressed.toml", &text, &set, None)
+                .unwrap_or_else(|error| panic!("{error}"));
+            let (_, report) = fly(&swarm, &mut |_, _| ControlFlow::Continue(())).expect("flies");
+            let clearance = report.clearance.expect("there are others");
+            assert!(clearance >= 0.2, "{model}, {limit}, seed {seed}: {clearance}");
+        }
+    }
+}
+
 /// Two that pass each other, behind poses off by more than the acceleration leads in a period, of which the file says nothing.
 #[test]
 fn poses_that_are_less_exact_than_declared_do_not_bring_robots_that_brake_nearer_than_they_are_off() {

@@ -42,26 +42,26 @@ impl NodeScope {
     /// # Errors
     /// A name that is no robot's, or a robot whose target depends on more than its neighbours.
     pub fn take(swarm: &Swarm, control: &mut Control, member: Option<&str>) -> Result<Self, NodeScopeError> {
-        let formation = control.formation();
+        let member = member.map(|name| only(swarm, control, name)).transpose()?;
+        Ok(Self::restrict(swarm, control, member))
+    }
+
+    /// The same of a robot that can be served alone, or of all.
+    pub(crate) fn restrict(swarm: &Swarm, control: &mut Control, member: Option<usize>) -> Self {
+        let all = || (0..control.formation().count()).collect();
         let part = match member {
-            None => {
-                let all: Vec<usize> = (0..formation.count()).collect();
-                Self { mine: all.clone(), heard: all }
-            }
-            Some(name) => {
-                let m = only(swarm, control, name)?;
-                Self { mine: vec![m], heard: heard(swarm, control, m) }
-            }
+            None => Self { mine: all(), heard: all() },
+            Some(m) => Self { mine: vec![m], heard: heard(swarm, control, m) },
         };
         control.listen_to(&part.heard);
         control.serve(&part.mine);
-        Ok(part)
+        part
     }
 }
 
 /// The members whose poses the loop of one needs, by number, ascending. Its target follows from its neighbours; to keep
 /// a clearance it has to see everyone, for programs and commands may bring any two together.
-pub fn heard(swarm: &Swarm, control: &Control, member: usize) -> Vec<usize> {
+fn heard(swarm: &Swarm, control: &Control, member: usize) -> Vec<usize> {
     let formation = control.formation();
     let keeps_clear = control.limits().keeps_apart && swarm.raw.node.hears == RawHears::All;
     let finds_anew = formation.engine().is_some_and(|engine| engine.lasting_neighbours().is_none());

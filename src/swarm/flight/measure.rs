@@ -6,6 +6,7 @@ use super::acceleration::Accelerations;
 use super::moment::Extreme;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::swarm::Swarm;
+use crate::swarm::robots::{Model, Robot};
 
 /// One period of a flight; distances in \[m\].
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -85,7 +86,8 @@ impl Record {
         if let Some(accelerations) = &mut self.accelerations {
             accelerations.take(flight, control.period());
         }
-        control.filter().clearance_on_the_way(before, &present, &mut self.around);
+        let bends = bends(flight, before);
+        control.filter().clearance_on_the_way([before, &present], bends.as_ref(), &mut self.around);
         for (least, &now) in self.clearances.iter_mut().zip(&self.around) {
             *least = least.min(now);
         }
@@ -144,6 +146,19 @@ pub(super) fn farthest(
     };
     let all = (0..present.len()).filter(|&m| counts(m)).map(apart);
     all.max_by(|a, b| a.value.total_cmp(&b.value).then(b.member.cmp(&a.member)))
+}
+
+/// How far robots that change their velocity evenly have gone aside in the period just flown, of which they end with the velocity
+/// that they have: `way - v T`; `None` of others, which go straight.
+fn bends(flight: &Flight, before: &Vectors) -> Option<Vectors> {
+    let fleet = flight.fleet();
+    let is_bent = matches!(fleet.model(), Model::DoubleIntegrator(_));
+    let period = flight.control().period();
+    let bend = |(m, robot): (usize, &Robot)| {
+        let from = before.get(m);
+        [0, 1].map(|k| robot.position[k] - from[k] - robot.velocity[k] * period)
+    };
+    is_bent.then(|| fleet.robots().iter().enumerate().map(bend).collect())
 }
 
 /// The robots that came that close.

@@ -33,6 +33,17 @@ impl Cell {
         self.planes.iter().any(|plane| plane.offset < 0.0)
     }
 
+    /// Whether no point within `reach` \[m\] of the member is in it.
+    pub fn is_empty(&self, reach: f64) -> bool {
+        self.is_left() && self.projection([0.0; 2], reach, 1.0).is_none()
+    }
+
+    /// How far outside the half-plane that it is farthest from a point is \[m\]; negative inside.
+    pub fn excess(&self, point: [f64; 2]) -> f64 {
+        let beyond = |plane: &HalfPlane| dot(plane.normal, point) - plane.offset;
+        self.planes.iter().map(beyond).fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// The point of the cell within `reach` \[m\] of the member that is nearest to `wanted` \[m\], and the way
     /// to it free: a step along the straight line from the member to the point, of any length, comes no
     /// nearer to anything than allowed.
@@ -172,11 +183,6 @@ mod tests {
         }
     }
 
-    fn excess(cell: &Cell, point: [f64; 2]) -> f64 {
-        let beyond = |plane: &HalfPlane| dot(plane.normal, point) - plane.offset;
-        cell.planes.iter().map(beyond).fold(f64::NEG_INFINITY, f64::max)
-    }
-
     fn apart(a: [f64; 2], b: [f64; 2]) -> f64 {
         length([a[0] - b[0], a[1] - b[1]])
     }
@@ -196,12 +202,12 @@ mod tests {
             let (cell, reach) = (cell(&planes), scale * reach);
             let wanted = [scale * wanted[0], scale * wanted[1]];
             let found = cell.nearest(wanted, reach);
-            prop_assert!(excess(&cell, found) <= 1e-12 * scale && length(found) <= reach * (1.0 + 1e-12));
+            prop_assert!(cell.excess(found) <= 1e-12 * scale && length(found) <= reach * (1.0 + 1e-12));
             for [x, y] in samples {
                 // Near the point that was found, where a better one would have to be, and anywhere.
                 for size in [1e-6, 1e-2, 1.0] {
                     let other = [found[0] + scale * size * x, found[1] + scale * size * y];
-                    if excess(&cell, other) <= 0.0 && length(other) <= reach {
+                    if cell.excess(other) <= 0.0 && length(other) <= reach {
                         let gain = apart(wanted, found) - apart(wanted, other);
                         prop_assert!(gain <= 1e-9 * scale, "{other:?} beats {found:?} by {gain}");
                     }

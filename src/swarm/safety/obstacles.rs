@@ -288,6 +288,24 @@ impl Obstacles {
         }
     }
 
+    /// The least distance from a straight way to a solid \[m\], as [`Obstacles::distance`] has that of a place; where the way goes through
+    /// a solid, or an end of it is in one, at most 0 or what the ends are.
+    pub(super) fn distance_along(&self, [from, to]: [[f64; 2]; 2]) -> f64 {
+        let of_ends = self.distance(from).min(self.distance(to));
+        if from == to || of_ends <= 0.0 || !of_ends.is_finite() {
+            return of_ends;
+        }
+        let (here, there) = (vector(from), vector(to));
+        let way = Segment::new(here, there);
+        let margin = Vector::splat(of_ends.min(LARGEST));
+        let near = Aabb::new(here.min(there) - margin, here.max(there) + margin);
+        let of_piece = |leaf: u32| match &self.pieces[leaf as usize] {
+            Piece::Edge { segment, .. } if segments_cross(from, to, pair(segment.a), pair(segment.b)) => 0.0,
+            piece => piece.distance(piece.place_nearest(here, Some(&way))),
+        };
+        self.tree.intersect_aabb(&near).map(of_piece).fold(of_ends, f64::min)
+    }
+
     /// The share of the straight way \[1\] that a disc of this radius \[m\], above 0, goes before it touches
     /// a solid, by shape cast; 1 where nothing is in the way.
     pub fn free_way(&self, from: [f64; 2], to: [f64; 2], radius: f64) -> f64 {

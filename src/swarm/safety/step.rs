@@ -84,6 +84,7 @@ impl Filter {
             }
             None => shortened(goal, request.step),
         };
+        let step = if brakes { step } else { self.unmoved_by_noise(here, step, &request, member) };
         let step = self.cast(here, step, origins, member);
         if request.distance > request.step {
             flags.0 |= Flags::SPEED_LIMITED;
@@ -198,6 +199,24 @@ impl Filter {
             }
         }
         Origins { obstacles, fence }
+    }
+
+    /// The step, or the way back to the place last sent where that is no farther out of an empty cell. There a member hardly goes
+    /// anywhere from its pose, and would go after the noise of its poses, tick by tick, into whatever it is pressed against.
+    fn unmoved_by_noise(
+        &self,
+        here: [f64; 2],
+        step: [f64; 2],
+        request: &MotionRequest,
+        member: usize,
+    ) -> [f64; 2] {
+        let back = minus(self.sent.get(member), here);
+        let is_noise = length(back) <= 2.0 * self.limits.margin();
+        if !is_noise || !self.cell.is_empty(request.reach) {
+            return step;
+        }
+        let back = shortened(back, request.step);
+        if self.cell.excess(back) <= self.cell.excess(step) { back } else { step }
     }
 
     /// The origins of the planes between the member and the end of its way.
