@@ -161,8 +161,7 @@ fn a_recording_of_the_node_of_one_robot_replays_to_the_bit() {
     let path = folder.path().join("flight.mcap");
     // They are sent through each other, so that it counts whose targets a node knows.
     let legs = "manoeuvres[0].legs=[{ seconds = 2.0, rotate = 90.0 }]";
-    let near = "limits.clearance=0.6";
-    let file = square(&[&PATIENT[..], &[legs, near]].concat());
+    let file = square(&[&PATIENT[..], &[legs, "limits.clearance=0.6", "control.sweeps=1"]].concat());
     let names = Control::new(&file).expect("valid").formation().names.clone();
     let member = names.last().cloned();
     let about = About { source: "node", member: member.clone(), ..About::default() };
