@@ -23,7 +23,8 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs) -> usize {
     running.max(own("VmHWM:").unwrap_or(0) as usize)
 }
 
-/// Bytes that one of so many ranks, with this part of a body, takes at its largest, its tables among them; the first one, if there shall be a report.
+/// Bytes that one of so many ranks, with this part of a body, takes at its largest, its tables among them, and what the first one
+/// keeps for a report.
 pub fn of_part(scene: &Scene, plan: &Plan, ranks: usize, report: bool) -> usize {
     flockform::export::memory::of_part(scene, plan, (ranks, report), code())
 }

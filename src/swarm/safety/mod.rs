@@ -91,13 +91,15 @@
 //!
 //! # Noise
 //! With [`Limits::deviation`] everything is kept three deviations of each member farther away, and the ways on which
-//! members come to rest by three deviations of their ends more. Where that leaves a member no room, the place at which it
-//! was last sent to come to rest stands for the one at which it seems to come to rest by now: noise moves the second as
-//! often on as back, and a member that is already too near would follow it on each time and back never. That leaves the
-//! declared clearance in all of the random flights that begin with it, late poses or not (`tests/swarm_safety`). Two
-//! cases are not covered. In a gap between solids that is narrower than the widened distances the way out is
-//! undetermined, and noise leads a member deeper. Late poses of members that take no time to brake carry the noise of
-//! several periods: in 1 of 90 random flights, with 3 periods and 2 cm, two came 2.5 cm nearer than declared.
+//! members come to rest by three deviations of their ends more. Where that leaves a member no room, the place at
+//! which it was last sent to come to rest stands for the one at which it seems to come to rest by now: noise moves
+//! the second as often on as back, and a member that is already too near would follow it on each time and back never.
+//! One that does not brake is sent back to where it was last sent, where no place is far enough from all and that one
+//! is no farther out of its cell: a step from each pose would go after the noise. That leaves the declared clearance
+//! in all of the random flights that begin with it, late poses or not (`tests/swarm_safety`). Two cases are not
+//! covered. In a gap between solids that is narrower than the widened distances the way out is undetermined, and
+//! noise leads a member deeper. Late poses of members that take no time to brake carry the noise of several periods:
+//! in 1 of 90 random flights, with 3 periods and 2 cm, two came 2.5 cm nearer than declared.
 //!
 //! # Lying members
 //! A pose that is farther from the last one than the speed limit allows, and half a metre of noise, is not accepted
