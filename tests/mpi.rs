@@ -147,7 +147,8 @@ fn assert_alike_on_ranks(folder: &tempfile::TempDir, scenes: &[(&str, &[&str])])
         let alone = folder.path().join(format!("{name}-alone"));
         let arguments = |out: &Path| {
             let out = out.display().to_string();
-            let fixed = ["run", name, "--figures", "none", "--out"].map(str::to_owned);
+            // Of figures each rank lays out the whole body.
+            let fixed = ["run", name, "--figures", "svg", "--out"].map(str::to_owned);
             fixed.into_iter().chain([out]).chain(more.iter().map(|&one| one.to_owned())).collect::<Vec<_>>()
         };
         let words = arguments(&alone);
