@@ -51,13 +51,12 @@ pub fn closing_words(scene: &Scene, outcome: &Outcome, summary: &Summary, elapse
     );
     let broken: Vec<_> = engine.breaks().iter().filter(|b| b.step > 0).collect();
     if let (Some(first), Some(last)) = (broken.first(), broken.last()) {
+        let [x, y] = first.place.map(page::number);
         words += &format!(
-            "{} bonds broke, from step {} to {}, the first at ({:.1}, {:.1}) {}, {:.0} % along the body\n",
+            "{} bonds broke, from step {} to {}, the first at ({x}, {y}) {}, {:.0} % along the body\n",
             broken.len(),
             first.step,
             last.step,
-            first.place[0],
-            first.place[1],
             scene.unit(),
             100.0 * engine.body().along()(first.place)
         );

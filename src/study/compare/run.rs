@@ -176,13 +176,13 @@ fn cautions(scene: &Scene, truth: &Reference, effort: &Effort) -> Vec<String> {
     let pushed = scene.loads.iter().position(|load| matches!(load, Load::Force { .. }));
     let pushed = pushed.map(|k| {
         format!(
-            "loads[{k}] pushes single points, where elasticity yields without limit: displacement, energy and stress of the              truth depend on its mesh, and so do the errors against it; a traction on an edge has a truth"
+            "loads[{k}] pushes single points, where elasticity yields without limit: displacement, energy and stress of the truth depend on its mesh, and so do the errors against it; a traction on an edge has a truth"
         )
     });
     let own = truth.error().displacement;
     let missed = (own.is_nan() || own > effort.target).then(|| {
         format!(
-            "the truth's own error is not known to be below the {:.2e} % asked for, on {} nodes; where single points hold or push              a body no mesh is fine enough",
+            "the truth's own error is not known to be below the {:.2e} % asked for, on {} nodes; where single points hold or push a body no mesh is fine enough",
             100.0 * effort.target,
             truth.nodes()
         )
