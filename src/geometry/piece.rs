@@ -197,22 +197,65 @@ pub(super) fn reversed(ring: &[Piece]) -> Vec<Piece> {
 
 /// Whether closed loops of pieces go around `p` an odd number of times.
 pub(crate) fn is_inside<'a>(pieces: impl Iterator<Item = &'a Piece>, p: Point) -> bool {
-    let changes = |piece: &Piece| u8::from(crosses_ray(piece, p)) + u8::from(is_in_segment(piece, p));
-    pieces.map(changes).fold(0, |sum: u8, next| sum ^ (next & 1)) == 1
+    pieces.fold(false, |sum, piece| sum ^ changes_side(piece, p))
 }
 
-/// Whether the chord of a piece crosses the ray from `p` to the right.
-fn crosses_ray(piece: &Piece, [x, y]: Point) -> bool {
-    let ([ax, ay], [bx, by]) = (piece.from, piece.to);
-    (ay > y) != (by > y) && x < ax + (y - ay) / (by - ay) * (bx - ax)
-}
-
-/// Whether `p` lies between the chord of a piece and its arc.
-fn is_in_segment(piece: &Piece, p: Point) -> bool {
-    let Some(arc) = &piece.arc else { return false };
+/// Whether the piece crosses the ray from `p` to the right an odd number of times: its chord once, and what lies between that and an
+/// arc once more. A place on the chord is to the right of it, or above, for both.
+fn changes_side(piece: &Piece, p: Point) -> bool {
+    let ([x, y], [ax, ay], [bx, by]) = (p, piece.from, piece.to);
+    let is_beside = (ay > y) != (by > y);
+    let crosses = is_beside && x < ax + (y - ay) / (by - ay) * (bx - ax);
+    let Some(arc) = &piece.arc else { return crosses };
     let (along, off) = (minus(piece.to, piece.from), minus(p, piece.from));
+    let is_right = if is_beside {
+        crosses == (along[1] < 0.0)
+    } else {
+        let right = off[0] * along[1] - off[1] * along[0];
+        right > 0.0 || (right == 0.0 && along[0] < 0.0)
+    };
     // An arc that turns left bulges to the right of its chord.
-    let right = off[0] * along[1] - off[1] * along[0];
-    let is_whole = piece.from == piece.to;
-    distance(p, arc.centre) < arc.radius && (is_whole || right * arc.sweep > 0.0)
+    let is_beyond_chord = piece.from == piece.to || is_right == (arc.sweep > 0.0);
+    crosses ^ (is_beyond_chord && distance(p, arc.centre) < arc.radius)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_on_the_chord_of_an_arc_are_inside_where_those_beside_it_are() {
+        for k in 0..16 {
+            let start = TAU * f64::from(k) / 16.0;
+            for sweep in [0.5 * TAU, 0.6 * TAU, 0.25 * TAU] {
+                // A disc as two arcs, either way round.
+                let disc = [(start, sweep), (start + sweep, TAU - sweep)]
+                    .map(|(a, b)| Piece::arc([2.0, 1.0], 5.0, a, b));
+                let turned = reversed(&disc);
+                for t in 1..10 {
+                    let p = Piece::edge(disc[0].to, disc[0].from).point(f64::from(t) / 10.0);
+                    assert!(
+                        is_inside(disc.iter(), p) && is_inside(turned.iter(), p),
+                        "{start} {sweep} {p:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_notch_whose_mouth_is_on_lattice_points_is_empty() {
+        let notch = [
+            Piece::edge([0.0, -10.0], [15.0, -10.0]),
+            Piece::edge([15.0, -10.0], [15.0, 10.0]),
+            Piece::edge([15.0, 10.0], [0.0, 10.0]),
+            Piece::edge([0.0, 10.0], [0.0, 5.0]),
+            Piece::arc_between([0.0, 5.0], [0.0, -5.0], [0.0, 0.0], true),
+            Piece::edge([0.0, -5.0], [0.0, -10.0]),
+        ];
+        for y in -4..=4 {
+            assert!(!is_inside(notch.iter(), [0.0, f64::from(y)]), "{y}");
+            assert!(is_inside(notch.iter(), [5.5, f64::from(y)]), "{y}");
+        }
+    }
 }
