@@ -165,13 +165,11 @@ pub(crate) fn segments_cross(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2])
         if twice_area.abs() <= rounding / unit * size { 0.0 } else { twice_area.signum() }
     };
     let (abc, abd, cda, cdb) = (side(a, b, c), side(a, b, d), side(c, d, a), side(c, d, b));
-    if abc == 0.0 && abd == 0.0 {
-        // On one line: they meet where their projections overlap.
-        let reaches = |low: f64, high: f64| low <= high + rounding;
-        return (0..2)
-            .all(|k| reaches(a[k].min(b[k]), c[k].max(d[k])) && reaches(c[k].min(d[k]), a[k].max(b[k])));
-    }
-    abc * abd <= 0.0 && cda * cdb <= 0.0
+    // On one line, or hardly longer than a point, they meet where their projections overlap.
+    let reaches = |low: f64, high: f64| low <= high + rounding;
+    let mut overlap =
+        (0..2).map(|k| reaches(a[k].min(b[k]), c[k].max(d[k])) && reaches(c[k].min(d[k]), a[k].max(b[k])));
+    abc * abd <= 0.0 && cda * cdb <= 0.0 && overlap.all(|overlap| overlap)
 }
 
 #[cfg(test)]
@@ -220,6 +218,14 @@ mod tests {
         assert!(!segments_cross([0.0, 0.0], [2.0, 0.0], [0.0, 1.0], [2.0, 1.0]));
         assert!(segments_cross([0.0, 0.0], [2.0, 0.0], [1.0, 0.0], [3.0, 0.0]));
         assert!(!segments_cross([0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]));
+        // Hardly longer than a point: on a slanted segment, beside it within its box, and beyond its end.
+        let slant = ([1.0, -2.0], [3.0, 2.0]);
+        let short = |x: f64, y: f64| ([x, y], [x, y + 2e-16]);
+        for (x, y, crosses) in [(2.0, 0.0, true), (1.7, 0.1, false), (2.4, 0.1, false), (3.5, 3.0, false)] {
+            let (a, b) = short(x, y);
+            assert_eq!(segments_cross(a, b, slant.0, slant.1), crosses, "{x} {y}");
+            assert_eq!(segments_cross(slant.0, slant.1, a, b), crosses, "{x} {y}");
+        }
         // A row of particles along a cut, with spacings that are no doubles.
         for unit in [1.0, 0.1, 0.3, 0.07] {
             let [y, low, high] = [3.0, 2.0, 4.0].map(|row| unit * row);

@@ -17,7 +17,13 @@ impl Filter {
     ) {
         nearest.clear();
         nearest.resize(after.len(), f64::INFINITY);
-        let Some(bends) = bends else { return self.clearance_on_chords([before, after], nearest) };
+        let from_solids = |places: &Vectors| -> Vec<f64> {
+            places.iter().map(|place| self.obstacles.distance(place)).collect()
+        };
+        let Some(bends) = bends else {
+            let ends = [&from_solids(before)[..], &from_solids(after)];
+            return self.clearance_on_chords([before, after], ends, nearest);
+        };
         let places = |k: u32| -> Vectors {
             let part = f64::from(k) / f64::from(CHORDS);
             let place = |m: usize| {
@@ -27,17 +33,21 @@ impl Filter {
             (0..after.len()).map(place).collect()
         };
         let mut from = places(0);
+        let mut from_there = from_solids(&from);
         for k in 1..=CHORDS {
             let to = places(k);
-            self.clearance_on_chords([&from, &to], nearest);
-            from = to;
+            let to_there = from_solids(&to);
+            self.clearance_on_chords([&from, &to], [&from_there, &to_there], nearest);
+            (from, from_there) = (to, to_there);
         }
     }
 
-    fn clearance_on_chords(&self, [before, after]: [&Vectors; 2], nearest: &mut [f64]) {
+    /// `ends` has the distances of both from solids \[m\], shapes \[count\].
+    fn clearance_on_chords(&self, [before, after]: [&Vectors; 2], ends: [&[f64]; 2], nearest: &mut [f64]) {
         for (m, nearest) in nearest.iter_mut().enumerate() {
-            *nearest =
-                nearest.min(self.obstacles.distance_along([before.get(m), after.get(m)]) - self.radii[m]);
+            let of_ends = f64::min(ends[0][m], ends[1][m]);
+            let along = self.obstacles.distance_along([before.get(m), after.get(m)], of_ends);
+            *nearest = nearest.min(along - self.radii[m]);
         }
         for a in 0..after.len() {
             for b in 0..a {
@@ -112,6 +122,10 @@ mod tests {
         let least = (0..=100_000).map(fine).fold(f64::INFINITY, f64::min);
         assert!((nearest[0] - least).abs() < 3.2 / 2048.0, "{nearest:?} for {least}");
         assert!(nearest[0] < 0.88 && nearest[1] > 1.0, "{nearest:?}");
+        // Moved by rounding alone, beside a slanted side.
+        let (still, moved) = (vectors([[5.008, 3.0], [0.0; 2]]), vectors([[5.008, 3.0 + 5e-16], [0.0; 2]]));
+        filter.clearance_on_the_way([&still, &moved], None, &mut nearest);
+        assert!((nearest[0] + 0.2246).abs() < 1e-3, "{nearest:?}");
         // Through a solid, and out of one.
         let (before, after) = (vectors([[0.37, 0.0], [5.05, 2.0]]), vectors([[0.37, 9.0], [9.0, 2.0]]));
         filter.clearance_on_the_way([&before, &after], None, &mut nearest);

@@ -289,9 +289,8 @@ impl Obstacles {
     }
 
     /// The least distance from a straight way to a solid \[m\], as [`Obstacles::distance`] has that of a place; of one that goes
-    /// through a solid at most 0.
-    pub(super) fn distance_along(&self, [from, to]: [[f64; 2]; 2]) -> f64 {
-        let of_ends = self.distance(from).min(self.distance(to));
+    /// through a solid at most 0. `of_ends` is that of the nearer end.
+    pub(super) fn distance_along(&self, [from, to]: [[f64; 2]; 2], of_ends: f64) -> f64 {
         if from == to || of_ends <= 0.0 || !of_ends.is_finite() {
             return of_ends;
         }
