@@ -183,7 +183,13 @@ pub fn solve_in_parts(
     let (solver, why) = choose(followers, request)?;
     let step = Request { solver: Choice::This(solver), tolerance: OF_A_STEP, ..*request };
     let order = Order::new(body);
-    let rule = Corotated { flock, weights, body, order, follows, held_axes, way, step, part };
+    // A sweep whose system is not positive definite just ends short of its tolerance.
+    let sees = |solver: Solver| !matches!(solver, Solver::Jacobi | Solver::GaussSeidel | Solver::Chebyshev);
+    let question = match sees(solver) {
+        true => step,
+        false => Request { solver: Choice::This(choose(followers, &Request::default())?.0), ..step },
+    };
+    let rule = Corotated { flock, weights, body, order, follows, held_axes, way, step, question, part };
     let mut newton = Newton {
         rule: &rule,
         size: rule.size(),
@@ -220,6 +226,8 @@ struct Corotated<'a> {
     way: &'a Way<'a>,
     /// How a linear system is solved.
     step: Request,
+    /// How one is solved to see whether it is positive definite.
+    question: Request,
     /// Where each rank has a part of the body.
     part: Option<SystemPart>,
 }
@@ -520,7 +528,7 @@ impl Newton<'_> {
         led: Vectors,
     ) -> Result<(), CorotatedError> {
         let rule = self.rule;
-        let solved = self.solved(locals, [left, led])?;
+        let solved = self.solved(locals, [left, led], &rule.step)?;
         self.last_step = rule.norm(&solved.displacement) / rule.norm(u).max(f64::MIN_POSITIVE);
         for (i, by) in solved.displacement.iter().enumerate() {
             let at = u.get(i);
@@ -541,7 +549,7 @@ impl Newton<'_> {
             [0, 1].map(of_axis)
         };
         let forces = locals.iter().enumerate().map(force).collect();
-        match self.solved(locals, [forces, Vectors::zeros(locals.len())]) {
+        match self.solved(locals, [forces, Vectors::zeros(locals.len())], &rule.question) {
             Err(CorotatedError::Solve(
                 SolveError::NotPositive { .. } | SolveError::Diverged { .. } | SolveError::Loose { .. },
             )) => Ok(false),
@@ -554,11 +562,12 @@ impl Newton<'_> {
         &mut self,
         locals: &[Option<Local>],
         left_and_led: [Vectors; 2],
+        request: &Request,
     ) -> Result<Solved, CorotatedError> {
         let (begin, rule) = (Stopwatch::start(), self.rule);
         let system = rule.system(locals, left_and_led).map_err(NotLinear::Operator)?;
         let assembled = begin.elapsed();
-        let solved = solve_linear(&system, &rule.step, rule.part.as_ref().map(|part| &part.team))?;
+        let solved = solve_linear(&system, request, rule.part.as_ref().map(|part| &part.team))?;
         self.times[0] += assembled + solved.phases[0].1;
         self.times[1] += solved.phases[1].1;
         Ok(solved)
