@@ -100,11 +100,16 @@ pub struct ResumedRun {
 impl ResumedRun {
     /// A killed run stands beside the place of its results, an interrupted one in it.
     fn find(dir: &Path) -> Result<Self, CheckpointError> {
+        // Outputs go where a link leads, and so do those that are not finished.
+        let full = dir.canonicalize().ok().filter(|_| dir.is_symlink());
+        let dir = full.as_deref().unwrap_or(dir);
         let stem = dir.file_stem().filter(|_| dir.extension().is_some_and(|ending| ending == "unfinished"));
         let out = stem.map_or_else(|| dir.to_owned(), |stem| dir.with_file_name(stem));
         for folder in [unfinished(&out), out.clone()] {
-            if let Some(checkpoint) = Checkpoint::read(&folder)? {
+            if let Some(mut checkpoint) = Checkpoint::read(&folder)? {
                 let fingerprint = checkpoint.fingerprint();
+                // Results of an interrupted run are replaced by those of the run that goes on, however often that is taken up.
+                checkpoint.asked.force |= folder == out;
                 return Ok(Self { checkpoint, fingerprint, folder, out });
             }
         }
@@ -126,10 +131,8 @@ impl ResumedRun {
 
     /// The folder to go on filling.
     pub fn open(&self) -> Result<OutputFolder, ExportError> {
-        if self.folder == self.out {
-            return OutputFolder::create(&self.out, true);
-        }
-        OutputFolder::reopen(&self.out, self.checkpoint.asked.force)
+        let open = if self.folder == self.out { OutputFolder::create } else { OutputFolder::reopen };
+        open(&self.out, self.checkpoint.asked.force)
     }
 
     /// The frames that were written before the checkpoint.
@@ -164,6 +167,8 @@ pub struct Checkpointer<'a> {
     before: Duration,
     last: Instant,
     last_step: usize,
+    /// Whether the last one could not be written: each one more is no news.
+    has_failed: bool,
 }
 
 impl<'a> Checkpointer<'a> {
@@ -184,6 +189,7 @@ impl<'a> Checkpointer<'a> {
             before,
             last: start,
             last_step,
+            has_failed: false,
         }
     }
 
@@ -216,10 +222,15 @@ impl<'a> Checkpointer<'a> {
             Ok(()) => {
                 let took = self.last.elapsed();
                 tracing::debug!("checkpoint of step {} in {took:.1?}", self.last_step);
+                if std::mem::take(&mut self.has_failed) {
+                    tracing::warn!("checkpoints are written again, at step {}", self.last_step);
+                }
             }
             Err(error) => {
                 interrupt::leave_to_the_end();
-                warn_of(&format!("no checkpoint at step {}", self.last_step), &error);
+                if !std::mem::replace(&mut self.has_failed, true) {
+                    warn_of(&format!("no checkpoint at step {} and on", self.last_step), &error);
+                }
             }
         }
         self.last = Instant::now();
@@ -244,7 +255,7 @@ impl<'a> Checkpointer<'a> {
         let left = self.write(folder, engine, kept, Ok(()));
         if let Err(error) = &left {
             interrupt::leave_to_the_end();
-            warn_of("the run could not be resumed", error);
+            warn_of("no checkpoint of the end", error);
         }
         !engine.0.any_of_parts(left.is_err())
     }

@@ -37,7 +37,7 @@ pub fn gallery(arguments: &GalleryArguments) -> Result<ExitCode, Refusal> {
         }
         run(exhibit, folder.path(exhibit.folder()), interrupted)?;
         if interrupted.load(Ordering::Relaxed) {
-            note!("{}", interrupt::NOTHING_KEPT);
+            interrupt::print_last_words();
             return Ok(ExitCode::from(FAILED));
         }
     }

@@ -32,7 +32,7 @@ const ENDS: u8 = 0;
 const KEEPS: u8 = 1;
 const SERVES: u8 = 2;
 
-pub const NOTHING_KEPT: &str = "interrupted: nothing is kept";
+const NOTHING_KEPT: &str = "interrupted: nothing is kept";
 
 /// How long work that keeps results may take to notice.
 const GRACE: Duration = Duration::from_millis(500);
@@ -196,7 +196,7 @@ fn end() -> ! {
             std::thread::sleep(Duration::from_millis(2));
         }
     }
-    let words = left.words.clone().unwrap_or_else(|| NOTHING_KEPT.to_owned());
+    let words = last_words(&left);
     let (done, printed) = std::sync::mpsc::channel();
     std::thread::spawn(move || {
         print(&words);
@@ -204,6 +204,16 @@ fn end() -> ! {
     });
     let _ = printed.recv_timeout(PRINTING);
     std::process::exit(FAILED.into())
+}
+
+/// Prints what the program's end would, where the work ends by itself.
+pub fn print_last_words() {
+    let words = last_words(&left());
+    print(&words);
+}
+
+fn last_words(left: &Left) -> String {
+    left.words.clone().unwrap_or_else(|| NOTHING_KEPT.to_owned())
 }
 
 fn print(words: &str) {

@@ -382,8 +382,8 @@ pub fn watch_interrupts() {
 /// Says why nothing was done, and gives the exit code; what an interrupt has broken off is no bad input.
 pub fn refuse(refusal: &Refusal) -> ExitCode {
     interrupt::leave_to_the_end();
-    if interrupt::is_raised() {
-        note!("{}", interrupt::NOTHING_KEPT);
+    if interrupt::is_raised() && !matches!(refusal, Refusal::Export(export::ExportError::NotMoved { .. })) {
+        interrupt::print_last_words();
         return ExitCode::from(FAILED);
     }
     if matches!(

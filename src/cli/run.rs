@@ -329,7 +329,7 @@ impl RunArguments {
 
     /// The requested run, independent of the working folder.
     fn asked(&self, left: Option<&ResumedRun>) -> RunRequest {
-        let force = self.output.force;
+        let force = self.output.force || left.is_some_and(|left| left.checkpoint.asked.force);
         match (&self.scene, left) {
             (None, Some(left)) => left.checkpoint.asked.clone(),
             (None, None) => unreachable!("a scene is required without --resume"),

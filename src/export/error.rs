@@ -34,6 +34,9 @@ pub enum ExportError {
     /// A path that ends in no name.
     #[error("{:?} does not name a folder that could be made: give --out a name", .0.display().to_string())]
     Unnamed(PathBuf),
+    /// A name that stands for a run that is not finished.
+    #[error("{} would be taken for a run that is not finished: give --out a name that does not end in .unfinished", .0.display())]
+    Reserved(PathBuf),
     /// A folder of outputs that the system does not let stand where it is asked for.
     #[error("cannot create {}: {source}\n  help: give --out a name in a folder that can be written to", .out.display())]
     Unmakeable {

@@ -49,9 +49,12 @@ impl OutputFolder {
     /// # Errors
     /// A folder that is not empty is refused without `force`; with it, one that holds files which flockform did not
     /// write. A file in the place, a parent that cannot be written to, and a place that another program is about to
-    /// fill are refused too.
+    /// fill are refused too, and a name that ends in `.unfinished`.
     pub fn create(out: &Path, force: bool) -> Result<Self, ExportError> {
         let out = in_full(out)?;
+        if out.extension().is_some_and(|ending| ending == "unfinished") {
+            return Err(ExportError::Reserved(out));
+        }
         require_free(&out, force)?;
         let above = out.ancestors().skip(1).take_while(|folder| !folder.exists());
         let made: Vec<PathBuf> = above.map(Path::to_owned).collect();

@@ -179,6 +179,44 @@ fn an_interrupted_run_goes_on_from_its_own_output() {
 
 #[cfg(unix)]
 #[test]
+fn a_resumed_run_that_is_killed_takes_the_place_of_the_interrupted_results_in_the_end() {
+    let folder = temporary();
+    let unfinished = folder.path().join("o.unfinished");
+    let interrupted = |attempt: u64| {
+        let every = ["--no-report", "--figures", "none", "--checkpoint-every", "2000steps"];
+        let run = ["run", "tension", "-q", "--force", "--out", "o", "--set", "stop.steps=400000"];
+        let mut child = start(&[&run[..], &every].concat(), folder.path());
+        wait_for(&unfinished);
+        std::thread::sleep(Duration::from_millis(20 * attempt));
+        signal("INT", child.id());
+        child.wait().expect("ends");
+        folder.path().join("o/checkpoint").exists()
+    };
+    // A machine that has other work may have no time to save: then there is the checkpoint before.
+    assert!((1..20).any(interrupted), "never in its place");
+    let child = start(&["run", "--resume", "o", "-q", "--checkpoint-every", "1steps"], folder.path());
+    wait_for(&unfinished.join("checkpoint"));
+    kill(child);
+    assert!(folder.path().join("o/checkpoint").exists() && unfinished.exists());
+    // By a link, too.
+    std::fs::create_dir(folder.path().join("elsewhere")).expect("writable");
+    std::os::unix::fs::symlink("../o", folder.path().join("elsewhere/link")).expect("a link");
+    done(&["run", "--resume", "elsewhere/link", "-q", "--no-report", "--figures", "none"], folder.path());
+    assert!(!folder.path().join("o/checkpoint").exists() && !unfinished.exists());
+    let summary = json(&std::fs::read_to_string(folder.path().join("o/summary.json")).expect("there"));
+    assert_eq!(summary["steps"], 400_000);
+    assert_eq!(names_in(folder.path()), ["elsewhere", "o"]);
+}
+
+#[test]
+fn a_name_that_stands_for_an_unfinished_run_is_refused() {
+    let folder = temporary();
+    refused_in(&["run", "tension", "--out", "o.unfinished"], folder.path(), &["does not end in .unfinished"]);
+    assert_eq!(std::fs::read_dir(folder.path()).expect("readable").count(), 0);
+}
+
+#[cfg(unix)]
+#[test]
 fn a_checkpoint_that_cannot_be_gone_on_from_is_refused_by_name_and_left_alone() {
     let folder = temporary();
     kill(endless(&[], folder.path()));
