@@ -64,8 +64,6 @@ struct State {
     /// Past changes, in the format of swarm files.
     commands: Vec<RawCommand>,
     faults: Vec<RawFault>,
-    /// Noise, delay and loss now.
-    channel: (f64, u32, f64),
     /// Things that viewers hold.
     hands: BTreeMap<Viewer, Hand>,
     alarms: Vec<Alarm>,
@@ -171,7 +169,7 @@ impl Swarm {
         let set = [self.history.set(), &[format!("{key}={value}")]].concat();
         let Source { file, folder } = &*self.history.source;
         let raw = file.with(&set, folder.as_deref())?.raw.flight;
-        let (mut noise, mut delay, mut loss) = self.history.now.channel;
+        let (mut noise, mut delay, mut loss) = self.flight().fleet().channel();
         match key {
             "flight.noise" => noise = raw.noise,
             "flight.delay" => delay = raw.delay,
@@ -183,7 +181,7 @@ impl Swarm {
             return Err("the safety filter refuses this noise".into());
         }
         self.history.keep();
-        (self.history.now.flight, self.history.now.channel) = (flight, (noise, delay, loss));
+        self.history.now.flight = flight;
         self.history.now.record(RawCommandKind::Channel { noise, delay, loss });
         Ok(())
     }
@@ -287,7 +285,7 @@ impl Session for Swarm {
     }
 
     fn sets(&self) -> Vec<String> {
-        let (noise, delay, loss) = self.history.now.channel;
+        let (noise, delay, loss) = self.flight().fleet().channel();
         let values = [noise.to_string(), delay.to_string(), loss.to_string()];
         let raw = &self.history.now.file.raw.flight;
         let is_changed = [noise != raw.noise, delay != raw.delay, loss != raw.loss];
@@ -413,7 +411,6 @@ impl history::State for State {
         let flight = Flight::new(&file)?;
         let raw = &file.raw.flight;
         Ok(Self {
-            channel: (raw.noise, raw.delay, raw.loss),
             faults: raw.faults.clone(),
             commands: Vec::new(),
             hands: BTreeMap::new(),

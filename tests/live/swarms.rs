@@ -88,6 +88,19 @@ fn at_one_period_the_commands_of_the_file_come_after_those_of_the_hand() {
 }
 
 #[test]
+fn what_the_file_makes_of_the_channel_stays_where_one_part_of_it_is_changed() {
+    let own =
+        "flight.commands=[{ after = 5, what = { kind = \"channel\", noise = 0.0, delay = 4, loss = 0.25 } }]";
+    let mut swarm = begun("square", &[own]);
+    fly(&mut swarm, 12);
+    assert_eq!(swarm.sets(), ["flight.delay=4", "flight.loss=0.25"]);
+    ask(&mut swarm, r#"{"do":"set","key":"flight.noise","value":"0.01"}"#);
+    assert_eq!(swarm.sets(), ["flight.noise=0.01", "flight.delay=4", "flight.loss=0.25"]);
+    fly(&mut swarm, 12);
+    assert_replays(&swarm);
+}
+
+#[test]
 fn a_follower_is_not_led_and_a_lead_out_of_range_is_refused() {
     let mut swarm = begun("square", &[]);
     let formation = swarm.flight().control().formation();

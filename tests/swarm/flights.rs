@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 
 use flockform::flock::vectors::{Vectors, distance};
 use flockform::scene::bundled::SWARMS;
+use flockform::scene::swarm::Swarm;
 use flockform::swarm::flight::{Flight, fly};
 use flockform::swarm::plan::SwarmPlan;
 
@@ -64,6 +65,38 @@ fn a_hundred_robots_swap_places_across_a_circle_and_all_arrive() {
     let swarm = load_swarm("antipodal", &["flight.bounds={ clearance = 0.1, final_error = 0.01 }"]);
     let (_, report) = flown(&swarm);
     assert!(report.holds(), "{:?}", report.bounds);
+}
+
+#[test]
+fn a_clearance_that_is_kept_holds_in_the_coordinates_of_a_map() {
+    for angle in [0.3_f64, 0.81, 1.4] {
+        let (x, y) = (2.0 * angle.cos(), 2.0 * angle.sin());
+        let place = |sign: f64| [356_000.0 + sign * x, 9_150_000.0 + sign * y];
+        let led = |sign: f64| {
+            format!(
+                "program = {{ kind = \"path\", points = [{{ at = 5.0, displacement = [{}, {}] }}] }}",
+                -sign * x,
+                -sign * y
+            )
+        };
+        let text = format!(
+            "title = \"Two robots sent to one place\"\nradius = 0.3\n\
+             robots = [{{ name = \"a\", place = {:?} }}, {{ name = \"b\", place = {:?} }}]\n\
+             links = {{ kind = \"nearest\", count = 1 }}\n\
+             leaders = [{{ robots = [\"a\"], {} }}, {{ robots = [\"b\"], {} }}]\n\
+             limits = {{ speed = 1.0, clearance = 0.3, acceleration = 1.0 }}\n\
+             flight = {{ duration = 12.0, model = {{ kind = \"double-integrator\" }}, bounds = {{ clearance = 0.3 }} }}",
+            place(-1.0),
+            place(1.0),
+            led(-1.0),
+            led(1.0)
+        );
+        let swarm =
+            Swarm::parse("map", "map.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+        let (_, report) = flown(&swarm);
+        assert!(report.holds(), "{angle}: {:?}", report.bounds);
+        assert!(report.clearance.expect("two") < 0.31, "they meet");
+    }
 }
 
 #[test]

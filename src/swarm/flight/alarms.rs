@@ -3,9 +3,11 @@
 use super::Flight;
 use super::measure::{Record, farthest};
 use super::moment::Extreme;
+use super::report::rounding_of;
 use crate::flock::vectors::Vectors;
 use crate::scene::swarm::Swarm;
 use crate::swarm::control::Control;
+use crate::swarm::formation::Formation;
 
 /// A declared bound that does not hold now.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,7 +28,8 @@ impl Alarm {
         let mut record = Record::new(swarm, flight);
         let sample = record.take(flight, before);
         let [affine, _, continuum] = record.farthest.last().copied().unwrap_or_default();
-        broken(swarm, affine, continuum, sample.clearance, &record.clearances)
+        let formation = flight.control().formation();
+        broken((swarm, formation), affine, continuum, sample.clearance, &record.clearances)
     }
 
     /// The bounds that robots break by their last poses. A robot without a usable pose breaks none, and no continuum
@@ -44,12 +47,12 @@ impl Alarm {
             around.iter().enumerate().map(|(m, &gap)| if is_usable(m) { gap } else { f64::INFINITY });
         let around: Vec<f64> = of_usable.collect();
         let clearance = around.iter().copied().fold(f64::INFINITY, f64::min);
-        broken(swarm, affine, None, clearance, &around)
+        broken((swarm, formation), affine, None, clearance, &around)
     }
 }
 
 fn broken(
-    swarm: &Swarm,
+    (swarm, formation): (&Swarm, &Formation),
     affine: Option<Extreme>,
     continuum: Option<Extreme>,
     clearance: f64,
@@ -61,11 +64,9 @@ fn broken(
         let robots = by.iter().map(|by| by.member).collect();
         (found > declared).then_some(Alarm { bound, declared, found, robots })
     };
-    let too_close = bounds.clearance.filter(|&declared| clearance < declared).map(|declared| Alarm {
-        bound: "clearance",
-        declared,
-        found: clearance,
-        robots: below(around, declared),
+    let rounding = rounding_of(formation);
+    let too_close = bounds.clearance.filter(|&declared| clearance < declared - rounding).map(|declared| {
+        Alarm { bound: "clearance", declared, found: clearance, robots: below(around, declared - rounding) }
     });
     let alarms = [
         above("affine_error", bounds.affine_error, affine),

@@ -116,6 +116,12 @@ impl Fleet {
         f64::from(self.channels.iter().map(periods).max().unwrap_or(0)) * self.dt
     }
 
+    /// Noise \[m\], delay \[period\] and loss \[1\] with which poses are sent.
+    pub(crate) fn channel(&self) -> (f64, u32, f64) {
+        let params = self.channels.first().map(Channel::params).unwrap_or_default();
+        (params.noise, params.delay, params.loss)
+    }
+
     /// Sends poses with this noise \[m\], delay \[period\] and loss \[1\] from now on.
     pub(super) fn set_channels(&mut self, noise: f64, delay: u32, loss: f64) {
         for channel in &mut self.channels {

@@ -6,7 +6,7 @@ use super::moment::Extreme;
 use super::{AccelerationReport, Flight, Moment, Record, Sample};
 use crate::flock::role::Role;
 use crate::scene::swarm::Swarm;
-use crate::swarm::formation::first_few;
+use crate::swarm::formation::{Formation, first_few};
 
 /// Distances in \[m\], times in \[s\].
 #[derive(Clone, Debug, Serialize)]
@@ -203,7 +203,7 @@ impl FlightReport {
         };
         let is_lost = |m: usize| flight.fleet().is_sound(m) && !flight.control().health(m).is_usable();
         let any_lost = (0..formation.count()).any(is_lost);
-        report.bounds = verdicts(swarm, &report, record, &formation.names, any_lost);
+        report.bounds = verdicts(swarm, &report, record, formation, any_lost);
         report
     }
 
@@ -248,16 +248,23 @@ fn settling_time(samples: &[Sample], programs_end: f64, within: f64) -> Option<f
     samples.get(settled).map(|sample| (sample.time - programs_end).max(0.0))
 }
 
+/// The part of a clearance that rounding alone may take where the filter keeps it exactly \[m\]: the farther the robots are from
+/// the origin of their coordinates, the more.
+pub(super) fn rounding_of(formation: &Formation) -> f64 {
+    let places = &formation.places;
+    let far = places.x.iter().chain(&places.y).fold(0.0, |far: f64, at| far.max(at.abs()));
+    (8.0 * f64::EPSILON * far).max(1e-9)
+}
+
 fn verdicts(
     swarm: &Swarm,
     report: &FlightReport,
     record: &Record,
-    names: &[String],
+    formation: &Formation,
     any_lost: bool,
 ) -> Vec<Verdict> {
     let bounds = &swarm.raw.flight.bounds;
-    // Rounding alone may take this much of a clearance that the filter keeps exactly.
-    const ROUNDING: f64 = 1e-9;
+    let (names, rounding) = (&formation.names, rounding_of(formation));
     let named = |extreme: Option<Extreme>| extreme.map(|extreme| extreme.named(names));
     let at_most = |bound, declared: Option<f64>, found: Option<f64>, worst: Option<Extreme>| {
         declared.map(|declared| Verdict {
@@ -293,7 +300,7 @@ fn verdicts(
             bound: "clearance",
             declared,
             found: report.clearance,
-            holds: report.clearance.is_some_and(|found| found >= declared - ROUNDING),
+            holds: report.clearance.is_some_and(|found| found >= declared - rounding),
             worst: named(record.closest),
         }),
     ];

@@ -85,9 +85,10 @@ impl fmt::Display for SwarmPlan {
                     "{largest:.4} m until the clearance holds robots at their places; simulated {simulated} m"
                 ),
             )?,
-            None => {
-                line("noise margin", format!("none set: robots are not kept apart; simulated {simulated} m"))?
-            }
+            None => line(
+                "noise margin",
+                format!("no two robots have a clearance to keep; simulated {simulated} m"),
+            )?,
         }
         let SpeedMargin { limit, lag_s, reachable, manoeuvres } = &self.speed;
         line("speed limit", limit.map_or("none".into(), |limit| format!("{limit} m/s")))?;
