@@ -212,6 +212,9 @@ fn the_largest_eigenvalue_is_that_of_the_rule() {
     let eq_1 = scalar(KINDS[0], FIRST).zone().expect("symmetric");
     assert!((eq_1.largest - 2.0).abs() < 1e-12 && eq_1.stable);
     assert!((scalar(KINDS[3], FIRST).zone().expect("symmetric").largest - 1.5).abs() < 1e-9);
+    // The two kinds of sites against each other, everywhere alike.
+    let honeycomb = scalar(LatticeKind::Honeycomb { spacing: 1.0 }, FIRST).zone().expect("symmetric");
+    assert!((honeycomb.largest - 2.0).abs() < 1e-12, "{honeycomb:?}");
     let calibrated =
         Crystal::material(&lattice(KINDS[0]), &sheet(1000.0, 0.33, Plane::Stress)).expect("cells");
     let zone = calibrated.zone().expect("symmetric");

@@ -29,6 +29,11 @@ pub struct Threshold {
 }
 
 impl Threshold {
+    /// Whether a prediction is known so well that runs may disagree with it.
+    fn is_predicted_well(&self) -> bool {
+        self.predicted.as_ref().is_none_or(|predicted| predicted.converged)
+    }
+
     /// Whether runs and spectrum say the same.
     pub fn agrees(&self) -> bool {
         match (&self.predicted, &self.found) {
@@ -67,6 +72,8 @@ pub struct Linear {
     pub converged: bool,
     /// Least and greatest eigenvalue of the sweep without feedback and damping, where they are real \[1\].
     pub ends: Option<[f64; 2]>,
+    /// Whether the eigenvalues at the ends are real as far as they are known.
+    pub are_real: bool,
     /// Thresholds at both ends of the range of each parameter.
     pub thresholds: Vec<Threshold>,
     /// The whole range of each parameter.
@@ -134,6 +141,7 @@ fn linear(subject: &Subject, effort: Effort, progress: &mut dyn FnMut(&str)) -> 
         radius: here.radius,
         iterations: here.iterations,
         converged: here.converged,
+        are_real: bare.are_real,
         ends: (bare.are_real && bare.converged).then_some([bare.lowest, bare.highest]),
         thresholds,
         sweeps,
@@ -215,9 +223,10 @@ impl Side {
 }
 
 impl Study {
-    /// Whether every prediction agrees with its bisection and no extreme is wrong.
+    /// Whether every prediction that settled agrees with its bisection and no extreme is wrong.
     pub fn holds(&self) -> bool {
-        let agree = self.linear.as_ref().is_none_or(|l| l.thresholds.iter().all(Threshold::agrees));
+        let agrees = |threshold: &Threshold| threshold.agrees() || !threshold.is_predicted_well();
+        let agree = self.linear.as_ref().is_none_or(|l| l.thresholds.iter().all(agrees));
         agree && !self.extremes.iter().any(|case| matches!(case.outcome, Outcome::Wrong { .. }))
     }
 }
@@ -262,7 +271,11 @@ impl fmt::Display for Linear {
             Some([low, high]) => {
                 writeln!(f, "eigenvalues without feedback and damping from {low:.9} to {high:.9}")?;
             }
-            None => writeln!(f, "its eigenvalues are not real: the sweep is not symmetric")?,
+            None if self.are_real => writeln!(f, "its least and greatest eigenvalue did not settle")?,
+            None => writeln!(
+                f,
+                "its eigenvalues seem not to be real: the sweep is not symmetric, and spectrum and runs are then less sure than they say"
+            )?,
         }
         writeln!(f, "{:26} {:>14} {:>14} {:>10}", "grows beyond", "predicted", "found by runs", "apart")?;
         for threshold in &self.thresholds {
@@ -274,10 +287,9 @@ impl fmt::Display for Linear {
             let shown = |value: Option<f64>| value.map_or("nowhere".into(), |v| format!("{v:.8}"));
             let apart = predicted.zip(found).map_or(String::new(), |(p, f)| format!("{:.1e}", (p - f).abs()));
             let settled = threshold.found.as_ref().is_none_or(|found| found.settled);
-            let predicted_well = threshold.predicted.as_ref().is_none_or(|predicted| predicted.converged);
             let verdict = match (threshold.agrees(), settled) {
+                _ if !threshold.is_predicted_well() => "  a spectrum on the way did not settle".into(),
                 (false, _) => format!("  THEY DISAGREE by more than {:.1e}", threshold.tolerance),
-                (true, _) if !predicted_well => "  a spectrum on the way did not settle".into(),
                 (true, false) => format!("  too slow to settle: known to {:.1e}", threshold.tolerance),
                 (true, true) => String::new(),
             };
