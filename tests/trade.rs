@@ -57,6 +57,52 @@ fn the_error_of_the_material_rule_falls_with_the_spacing_and_solvers_agree() {
     );
 }
 
+#[test]
+fn other_spacings_that_are_held_or_pushed_otherwise_are_no_part_of_a_study() {
+    let errors = |sets: &[&str], words: &str| {
+        let scene = bundled("beam-loaded").expect("bundled");
+        let base: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+        let study = run(&|more| scene.load(&[&base[..], more].concat()), &Grid::quick(), &mut |_| {});
+        let study = study.unwrap_or_else(|error| panic!("{error}"));
+        let at = |spacing: f64| {
+            let here = move |point: &&flockform::study::trade::Point| {
+                point.setting.spacing == spacing && point.setting.rule == RuleChoice::Material
+            };
+            study.points.iter().filter(here)
+        };
+        assert!(study.to_string().contains(words), "{study}");
+        for point in at(0.5) {
+            assert!(matches!(&point.outcome, Outcome::Refused { reason } if reason.contains(words)));
+        }
+        let whole = scene.load(&base).unwrap_or_else(|error| panic!("{error}"));
+        let compared = compare(&whole, &Effort::default(), &mut |_, _| ControlFlow::Continue(()));
+        let compared = compared.unwrap_or_else(|error| panic!("{error}")).comparison.displacement_rel_l2;
+        let errors: Vec<f64> =
+            at(1.0).filter(|point| point.setting.tolerance <= 1e-6).filter_map(|p| p.error).collect();
+        assert!(!errors.is_empty(), "{study}");
+        for error in errors {
+            assert!((error / compared - 1.0).abs() < 0.01, "{error}, {compared}");
+        }
+    };
+    errors(&[PUSHED], "in which it pushes more particles");
+    errors(
+        &["roles=[{region={kind=\"ids\",ids=[1,2,3,4,5,6]},role=\"clamped\"}]"],
+        "these ids are other particles",
+    );
+}
+
+#[test]
+fn a_study_of_a_body_that_is_changed_on_its_way_names_what_changes_it() {
+    let scene = bundled("beam-loaded").expect("bundled");
+    let sets = [
+        "equilibrium={}".to_owned(),
+        "roles=[{region={kind=\"edge\",side=\"left\"},role=\"clamped\",from=5}]".to_owned(),
+    ];
+    let refused = run(&|more| scene.load(&[&sets[..], more].concat()), &Grid::quick(), &mut |_| {});
+    let said = refused.expect_err("refused").to_string();
+    assert!(said.contains("roles[0].from") && said.contains("leave this entry out to compare"), "{said}");
+}
+
 /// A bundled scene in the setting chosen for an accuracy, and the error estimated for it.
 fn chosen_for(name: &str, overrides: &[&str], accuracy: &str) -> Result<Chosen, SceneError> {
     let scene = bundled(name).expect("bundled");
@@ -183,6 +229,7 @@ fn an_accuracy_that_cannot_be_had_is_refused_with_the_reason() {
         (refused("lattice-square", &[], "1%"), "the scene has none"),
         (refused("beam-loaded", &["record.probes=[3]"], "1%"), "these ids are other particles"),
         (refused("beam-loaded", &[PUSHED], "1%"), "in which it pushes more particles"),
+        (refused("beam-loaded", &["load_steps={schedule=[1.0,0.5]}"], "1%"), "the last part is 0.5"),
         (
             refused("beam-loaded", &[DISC, "lattice.spacing=2.0"], "0.5%"),
             "less of a side that is not straight is outermost",

@@ -12,7 +12,7 @@ use crate::flock::rules::{Mean, Rotation};
 use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
-use crate::material::stress::{self, Over, StressState};
+use crate::material::stress::{self, AroundParticles, Over, StressState};
 
 /// Part of the strain energy by which the work done on the way may differ from it.
 const MISSED_WORK: f64 = 0.05;
@@ -83,8 +83,7 @@ impl Stresses {
         let (cells, elastic) = (engine.cells()?, engine.elastic_at(step)?);
         let torn = torn(cells, displacement.len(), broken);
         let of_cells = of_whole_cells(engine, (cells, &torn), elastic, displacement);
-        let mut particles =
-            stress::at_particles(cells, elastic, &of_cells, displacement.len(), |cell| !torn[cell]);
+        let mut particles = AroundParticles::new(cells, elastic, &of_cells, displacement.len()).all_larger();
         let recovered = match broken {
             [] => recovered(engine, elastic, &of_cells, (displacement, rotation(engine))),
             _ => Vec::new(),
@@ -190,7 +189,8 @@ fn of_whole_cells(
 ) -> Vec<StressState> {
     let mut of_cells = stress::of_cells(cells, elastic, displacement, rotation(engine));
     for (stress, _) in of_cells.iter_mut().zip(torn).filter(|(_, torn)| **torn) {
-        *stress = StressState { strain: [f64::NAN; 3], components: [f64::NAN; 3], von_mises: f64::NAN };
+        let components = [f64::NAN; 3];
+        *stress = StressState { strain: components, components, across: f64::NAN, von_mises: f64::NAN };
     }
     of_cells
 }
@@ -250,7 +250,7 @@ impl Mechanics {
             )),
             _ => {}
         }
-        cautions.extend(self.missed_work());
+        cautions.extend(self.missed_work(engine));
         if let Some(cells) = engine.cells().filter(|_| is_material) {
             cautions.extend(edge_stress::cautions(engine.free_edge(), (engine.body(), cells), |own| {
                 engine.count_of_parts(own)
@@ -267,15 +267,20 @@ impl Mechanics {
     }
 
     /// The trapezoid rule misses work where forces are not linear between two equilibria.
-    fn missed_work(&self) -> Option<String> {
+    fn missed_work(&self, engine: &Engine) -> Option<String> {
         let done = self.work_done.map(|work| work.loads + work.supports)?;
-        let missed = (done - self.strain_energy).abs() / self.strain_energy;
         let is_loaded = self.largest_strain > UNSTRAINED;
-        (is_loaded && missed > MISSED_WORK && missed.is_finite()).then(|| {
+        let of = if is_loaded { self.strain_energy } else { engine.path()?.most() };
+        let missed = (done - self.strain_energy).abs() / of;
+        (missed > MISSED_WORK && missed.is_finite()).then(|| {
+            let missed = percent(missed);
+            let off = match is_loaded {
+                true => format!("differs by {missed} from the strain energy, which holds"),
+                false => format!("comes to {missed} of the most on it, and to zero in a body that gives it back"),
+            };
             format!(
-                "the work done on the way, summed up by the trapezoid rule from one equilibrium to the next, differs by \
-                 {} from the strain energy, which holds: use more load_steps.increments",
-                percent(missed)
+                "the work done on the way, summed up by the trapezoid rule from one equilibrium to the next, {off}: \
+                 smaller parts (load_steps.increments or load_steps.schedule) mend it, unless the body snaps from one to another"
             )
         })
     }

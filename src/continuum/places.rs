@@ -10,7 +10,7 @@ use crate::engine::Engine;
 use crate::flock::body::{Body, Cut};
 use crate::material::cells::Cells;
 use crate::material::place::Around;
-use crate::material::stress::StressState;
+use crate::material::stress::{AroundParticles, StressState};
 use crate::ranks::Team;
 use crate::scene::{BodySource, Scene, SceneError};
 
@@ -55,8 +55,8 @@ pub fn around(
         };
         let own = numbers.owned.iter().cloned().flatten();
         let own = Around::nearest(place, (cells, own), &body.reference);
-        let found = own.as_ref().map_or([f64::INFINITY.to_bits(), u64::MAX], |(_, cell, apart)| {
-            [apart.to_bits(), numbers.number(*cell) as u64]
+        let found = own.as_ref().map_or([f64::INFINITY.to_bits(), u64::MAX], |(around, apart)| {
+            [apart.to_bits(), numbers.number(around.cell) as u64]
         });
         let ranks = team.map_or_else(|| Vec::from([found]), |team| team.each(found));
         // The first of several cells, whose rank has it.
@@ -75,12 +75,15 @@ pub fn around(
 pub fn at_places(scene: &Scene, engine: &Engine, stresses: &Stresses) -> Vec<AtPlace> {
     let team = engine.parted();
     let around = around(scene, (engine.body(), engine.cells()), team).unwrap_or_default();
+    let material = engine.cells().zip(engine.elastic());
+    let sides = material
+        .map(|(cells, elastic)| AroundParticles::new(cells, elastic, &stresses.cells, engine.body().count()));
     let at = |(k, around): (usize, Option<Around>)| {
         let around = around?;
         let [ux, uy] = around.mean(|i| Some(engine.displacement(i))).unwrap_or_default();
+        let found = sides.as_ref().and_then(|sides| sides.at_place(&around, &stresses.particles));
         let of = |StressState { components: [xx, yy, xy], von_mises, .. }| [xx, yy, xy, von_mises];
-        let found = around.mean(|i| stresses.particles[i].map(of));
-        let [xx, yy, xy, von_mises] = found.unwrap_or([f64::NAN; 4]);
+        let [xx, yy, xy, von_mises] = found.map_or([f64::NAN; 4], of);
         Some((k, [ux, uy, xx, yy, xy, von_mises].map(f64::to_bits)))
     };
     let own = around.into_iter().enumerate().filter_map(at);

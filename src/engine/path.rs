@@ -24,6 +24,7 @@ pub struct Work {
 #[derive(Clone, Debug, Default)]
 pub struct Path {
     done: Work,
+    most: f64,
     last: Option<Acting>,
 }
 
@@ -39,6 +40,11 @@ impl Path {
     /// The sum so far.
     pub fn done(&self) -> Work {
         self.done
+    }
+
+    /// The largest size of the sum of both at any equilibrium so far \[force length\].
+    pub fn most(&self) -> f64 {
+        self.most
     }
 
     /// Adds the way to where the engine's body is at rest now.
@@ -64,6 +70,7 @@ impl Path {
         let [loads, supports] = engine.sum_over([-0.0; 2], engine.body().owned().map(done));
         self.done.loads += loads;
         self.done.supports += supports;
+        self.most = self.most.max((self.done.loads + self.done.supports).abs());
         self.last = Some(now);
     }
 }

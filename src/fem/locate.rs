@@ -27,12 +27,11 @@ impl<'m> Locator<'m> {
         Locator { mesh, boxes: BoxTree::new((0..mesh.cell_count()).map(of_cell)) }
     }
 
-    /// The lowest-numbered cell that holds `p` \[m\], with the reference coordinates there.
-    pub fn find(&self, p: [f64; 2]) -> Option<(usize, [f64; 2])> {
+    /// The cells that hold `p` \[m\], with the reference coordinates there: several on their sides and corners.
+    pub fn holding(&self, p: [f64; 2]) -> impl Iterator<Item = (usize, [f64; 2])> {
         let place =
-            |cell| invert(self.mesh, cell, p).filter(|&place| self.mesh.kind().contains(place, SLACK));
-        let holding = self.boxes.overlapping(p, p).filter_map(|cell| Some((cell, place(cell)?)));
-        holding.min_by_key(|&(cell, _)| cell)
+            move |cell| invert(self.mesh, cell, p).filter(|&place| self.mesh.kind().contains(place, SLACK));
+        self.boxes.overlapping(p, p).filter_map(move |cell| Some((cell, place(cell)?)))
     }
 
     /// The cell nearest to a point that is in none, with reference coordinates that continue it to the point; `None`
@@ -93,13 +92,13 @@ mod tests {
                 let (r, t) =
                     (1.02 + 0.94 * (k as f64 * 0.618).fract(), 0.01 + 1.18 * (k as f64 * 0.414).fract());
                 let p = [r * t.cos(), r * t.sin()];
-                let (cell, place) = locator.find(p).unwrap_or_else(|| panic!("{kind:?} {p:?}"));
+                let (cell, place) = locator.holding(p).next().unwrap_or_else(|| panic!("{kind:?} {p:?}"));
                 let q = kind.shape(place).interpolate(&mesh.positions(cell)[..kind.nodes()]);
                 assert!((p[0] - q[0]).hypot(p[1] - q[1]) < 1e-12, "{kind:?} {p:?} {q:?}");
             }
             for p in [[0.0, 0.0], [0.9, 0.1], [5.0, 5.0], [-1.0, 0.5], [f64::NAN, 0.0], [f64::INFINITY, 1.0]]
             {
-                assert!(locator.find(p).is_none(), "{kind:?} {p:?}");
+                assert!(locator.holding(p).next().is_none(), "{kind:?} {p:?}");
             }
         }
     }

@@ -57,6 +57,15 @@ impl Inclusions {
         let number = self.of_cell.get(cell).copied().unwrap_or(0);
         number.checked_sub(1).map_or(body, |k| &self.materials[k as usize])
     }
+
+    /// The number that a cell shares with all cells of the same material.
+    pub(super) fn kind(&self, cell: usize, body: &Material) -> u32 {
+        let own = self.material(cell, body);
+        if own == body {
+            return 0;
+        }
+        self.materials.iter().position(|material| material == own).map_or(0, |k| k as u32 + 1)
+    }
 }
 
 /// Stress at a point, components along the axes of the mesh [N/m2].

@@ -179,6 +179,26 @@ impl Mesh {
         self.kind.side_nodes(side.side as usize).map(|local| cell[local] as usize)
     }
 
+    /// The same cells, sharing nodes with cells of the same part alone; `part` by cell. Nodes are copied behind the others,
+    /// which keep their numbers; the second array has the node that each is at.
+    pub(crate) fn parted(&self, part: impl Fn(usize) -> u32) -> (Mesh, Vec<u32>) {
+        let mut own = vec![None; self.node_count()];
+        let mut copies: HashMap<(u32, u32), u32> = HashMap::new();
+        let (mut mesh, mut at): (Mesh, Vec<u32>) = (self.clone(), (0..self.node_count() as u32).collect());
+        for (place, node) in mesh.cells.iter_mut().enumerate() {
+            let part = part(place / self.kind.nodes());
+            if *own[*node as usize].get_or_insert(part) != part {
+                *node = *copies.entry((*node, part)).or_insert_with(|| {
+                    at.push(*node);
+                    at.len() as u32 - 1
+                });
+            }
+        }
+        let of = |values: &[f64]| at.iter().map(|&node| values[node as usize]).collect();
+        (mesh.x, mesh.y) = (of(&self.x), of(&self.y));
+        (mesh, at)
+    }
+
     /// For each node the cells that use it, ascending: list i is `cells[start[i]..start[i + 1]]`.
     pub(crate) fn cells_of_nodes(&self) -> (Vec<u32>, Vec<u32>) {
         let cell = |at: usize| (at / self.kind.nodes()) as u32;

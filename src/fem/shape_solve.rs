@@ -275,7 +275,8 @@ impl ShapeSolution {
 
     /// Stress [N/m2] at points \[m\] of the undeformed body, shape \[points\]: inside recovered from the cells around
     /// ([`Solution::stress_at_points`]), on the boundary, where that has cells on one side only and is less accurate
-    /// than the cells themselves, the mean of the cells that have a side there.
+    /// than the cells themselves, the mean of the cells that have a side there. Where materials meet, it is that of the
+    /// side where von Mises stress is larger.
     ///
     /// # Errors
     /// As [`ShapeSolution::displacements_at`].
@@ -289,25 +290,28 @@ impl ShapeSolution {
     /// As [`ShapeSolution::displacements_at`].
     pub(crate) fn stress_within(&self, points: &[Point], reach: f64) -> Result<Vec<Stress>, FemError> {
         let (x, y): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p[0], p[1])).unzip();
-        self.solution.interpolated_within(&self.nodal_stress(), &x, &y, reach)
+        let (parted, _) = self.solution.parted();
+        parted.interpolated_within(&nodal_stress(&parted), &x, &y, reach)
     }
+}
 
-    fn nodal_stress(&self) -> Vec<Stress> {
-        let (mesh, mut stress) = (self.solution.mesh(), self.solution.stress_at_points());
-        let mut sums: BTreeMap<u32, (Stress, f64)> = BTreeMap::new();
-        for side in mesh.boundary() {
-            for local in mesh.kind().side_nodes(side.side as usize) {
-                let node = mesh.cell(side.cell as usize)[local];
-                let own = self.solution.stress_at_node(side.cell as usize, local);
-                let (sum, count) = sums.entry(node).or_default();
-                let Stress { xx, yy, xy, zz } = *sum;
-                *sum = Stress { xx: xx + own.xx, yy: yy + own.yy, xy: xy + own.xy, zz: zz + own.zz };
-                *count += 1.0;
-            }
+/// At the nodes of a mesh whose cells share nodes with cells of their own material alone: where materials meet there is a
+/// boundary for either.
+fn nodal_stress(parted: &Solution) -> Vec<Stress> {
+    let (mesh, mut stress) = (parted.mesh(), parted.recovered_stress());
+    let mut sums: BTreeMap<u32, (Stress, f64)> = BTreeMap::new();
+    for side in mesh.boundary() {
+        for local in mesh.kind().side_nodes(side.side as usize) {
+            let node = mesh.cell(side.cell as usize)[local];
+            let own = parted.stress_at_node(side.cell as usize, local);
+            let (sum, count) = sums.entry(node).or_default();
+            let Stress { xx, yy, xy, zz } = *sum;
+            *sum = Stress { xx: xx + own.xx, yy: yy + own.yy, xy: xy + own.xy, zz: zz + own.zz };
+            *count += 1.0;
         }
-        for (node, (Stress { xx, yy, xy, zz }, n)) in sums {
-            stress[node as usize] = Stress { xx: xx / n, yy: yy / n, xy: xy / n, zz: zz / n };
-        }
-        stress
     }
+    for (node, (Stress { xx, yy, xy, zz }, n)) in sums {
+        stress[node as usize] = Stress { xx: xx / n, yy: yy / n, xy: xy / n, zz: zz / n };
+    }
+    stress
 }

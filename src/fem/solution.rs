@@ -106,11 +106,24 @@ impl Solution {
         reach: f64,
     ) -> Result<Vec<[f64; 2]>, FemError> {
         let n = self.mesh.kind().nodes();
-        self.at_places(x, y, reach, |cell, shape| shape.interpolate(&self.of_cell(cell)[..n]))
+        let first = |cells: &[(usize, Shape)]| {
+            let (cell, shape) = &cells[0];
+            shape.interpolate(&self.of_cell(*cell)[..n])
+        };
+        self.at_places(x, y, reach, first)
+    }
+
+    /// The same field on a mesh where cells share nodes with cells of their own material alone, so that stress at a node is
+    /// that of one side; the second array has the node of this mesh that each is at.
+    pub(super) fn parted(&self) -> (Solution, Vec<u32>) {
+        let (mesh, at) = self.mesh.parted(|cell| self.inclusions.kind(cell, &self.material));
+        let of = |values: &[f64]| at.iter().map(|&node| values[node as usize]).collect();
+        (Solution { mesh, ux: of(&self.ux), uy: of(&self.uy), ..self.clone() }, at)
     }
 
     /// Stress known at the nodes, shape \[nodes\], at each point (x, y) \[m\]; points no further outside than `reach` \[m\]
-    /// take the nearest cell, continued to them.
+    /// take the nearest cell, continued to them. Where cells that hold a point have different stresses there, it is the one of
+    /// the largest von Mises stress.
     ///
     /// # Errors
     /// As for [`Solution::displacements_at`].
@@ -123,32 +136,39 @@ impl Solution {
     ) -> Result<Vec<Stress>, FemError> {
         let all = |component: fn(&Stress) -> f64| at_nodes.iter().map(component).collect::<Vec<f64>>();
         let (xx, yy, xy, zz) = (all(|s| s.xx), all(|s| s.yy), all(|s| s.xy), all(|s| s.zz));
-        self.at_places(x, y, reach, |cell, shape| {
-            let n = self.mesh.kind().nodes();
-            let [in_x, in_y] = shape.interpolate(&self.mesh.gather(cell, &xx, &yy)[..n]);
-            let [shear, out] = shape.interpolate(&self.mesh.gather(cell, &xy, &zz)[..n]);
+        let n = self.mesh.kind().nodes();
+        let in_cell = |(cell, shape): &(usize, Shape)| {
+            let [in_x, in_y] = shape.interpolate(&self.mesh.gather(*cell, &xx, &yy)[..n]);
+            let [shear, out] = shape.interpolate(&self.mesh.gather(*cell, &xy, &zz)[..n]);
             Stress { xx: in_x, yy: in_y, xy: shear, zz: out }
-        })
+        };
+        let by_size = |a: &Stress, b: &Stress| a.von_mises().total_cmp(&b.von_mises());
+        let largest =
+            |cells: &[(usize, Shape)]| cells.iter().map(in_cell).max_by(by_size).unwrap_or_default();
+        self.at_places(x, y, reach, largest)
     }
 
-    /// `value(cell, shape functions)` at each point.
+    /// `value` of the cells that hold each point, ascending and never none, with their shape functions there.
     fn at_places<T>(
         &self,
         x: &[f64],
         y: &[f64],
         reach: f64,
-        value: impl Fn(usize, &Shape) -> T,
+        value: impl Fn(&[(usize, Shape)]) -> T,
     ) -> Result<Vec<T>, FemError> {
         if x.len() != y.len() {
             return Err(FemError::Length { what: "y", found: y.len(), expected: x.len().to_string() });
         }
         let locator = Locator::new(&self.mesh);
         let at = |(index, (&x, &y)): (usize, (&f64, &f64))| {
-            let (cell, place) = locator
-                .find([x, y])
-                .or_else(|| if reach > 0.0 { locator.nearest([x, y], reach) } else { None })
-                .ok_or(FemError::OutsideMesh { index, x, y })?;
-            Ok(value(cell, &self.mesh.kind().shape(place)))
+            let mut cells: Vec<(usize, [f64; 2])> = locator.holding([x, y]).collect();
+            if cells.is_empty() && reach > 0.0 {
+                cells.extend(locator.nearest([x, y], reach));
+            }
+            cells.sort_by_key(|&(cell, _)| cell);
+            let cells = cells.into_iter().map(|(cell, place)| (cell, self.mesh.kind().shape(place)));
+            let cells: Vec<(usize, Shape)> = cells.collect();
+            if cells.is_empty() { Err(FemError::OutsideMesh { index, x, y }) } else { Ok(value(&cells)) }
         };
         x.iter().zip(y).enumerate().map(at).collect()
     }

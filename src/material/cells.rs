@@ -15,7 +15,9 @@ use crate::flock::vectors::Vectors;
 
 use super::boundary::{Boundary, ways};
 use super::elastic::Elastic;
-use super::stiffness::{ShapeError, centroid, cut_load_shares, element_of, load_shares, mean_strain};
+use super::stiffness::{
+    ShapeError, centroid, cut_load_shares, element_of, is_conforming, load_shares, mean_strain,
+};
 use crate::geometry::lists::{self, distinct, lists_of};
 use crate::geometry::outline::{Outline, OutlineError};
 use crate::geometry::point::plus;
@@ -140,6 +142,15 @@ impl Cells {
     /// As [`element`](super::stiffness::element).
     pub fn element(&self, kind: usize, elastic: &Elastic) -> Result<DMatrix<f64>, ShapeError> {
         element_of(&self.shapes[kind], self.material(kind, elastic), kind >= self.whole)
+    }
+
+    /// Whether all cells have the energy of one continuous displacement; see [`is_conforming`].
+    pub fn are_conforming(&self, elastic: &Elastic) -> bool {
+        let used = distinct(self.kind.iter().map(|&kind| kind as usize));
+        let conforms = |&kind: &usize| {
+            is_conforming(&self.shapes[kind], self.material(kind, elastic), kind >= self.whole)
+        };
+        used.iter().all(conforms)
     }
 
     /// The material of the cells of a kind, where `body` is that of the body outside its inclusions.

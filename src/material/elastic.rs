@@ -190,17 +190,26 @@ impl Elastic {
         self.stiffness.cholesky().map_or([f64::NAN; 3], |factor| factor.solve(&forces).into())
     }
 
-    /// Von Mises stress \[force / length^2\] under a strain (xx, yy, engineering xy) \[1\]; in plane strain
-    /// with the stress across the thickness that keeps the faces from parting.
+    /// Von Mises stress \[force / length^2\] under a strain (xx, yy, engineering xy) \[1\].
     pub fn von_mises(&self, strain: [f64; 3]) -> f64 {
-        let [xx, yy, xy] = self.stress(strain);
-        let zz = match self.constants {
+        von_mises(self.stress(strain), self.stress_across(strain))
+    }
+
+    /// Stress across the sheet \[force / length^2\] under a strain (xx, yy, engineering xy) \[1\]: in plane strain what keeps the
+    /// faces from parting.
+    pub fn stress_across(&self, strain: [f64; 3]) -> f64 {
+        let [xx, yy, _] = self.stress(strain);
+        match self.constants {
             Constants::Isotropic { poisson, plane: Plane::Strain, .. } => poisson * (xx + yy),
             _ => 0.0,
-        };
-        let (a, b, c) = (xx - yy, yy - zz, zz - xx);
-        (0.5 * (a * a + b * b + c * c) + 3.0 * xy * xy).sqrt()
+        }
     }
+}
+
+/// Von Mises stress \[force / length^2\] of xx, yy, xy and of zz.
+pub fn von_mises([xx, yy, xy]: [f64; 3], zz: f64) -> f64 {
+    let (a, b, c) = (xx - yy, yy - zz, zz - xx);
+    (0.5 * (a * a + b * b + c * c) + 3.0 * xy * xy).sqrt()
 }
 
 fn positive(name: &'static str, value: f64) -> Result<(), ElasticError> {

@@ -7,6 +7,8 @@ use crate::geometry::point::{Point, dot, minus};
 /// The particles around a place, and shares with which they stand for it: linear fields are met exactly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Around {
+    /// The cell that it is in: the first of several.
+    pub cell: usize,
     /// Indices of the particles.
     pub particles: Vec<u32>,
     /// They add up to 1.
@@ -14,20 +16,12 @@ pub struct Around {
 }
 
 impl Around {
-    /// Of a place \[length\] in a cell, or no further than `reach` \[length\] outside all of them, where the nearest point
-    /// of a cell stands for it.
-    pub fn of(place: Point, cells: &Cells, reference: &Vectors, reach: f64) -> Option<Self> {
-        let (around, _, apart) = Self::nearest(place, (cells, 0..cells.count()), reference)?;
-        (apart <= reach).then_some(around)
-    }
-
-    /// Of the point nearest to a place \[length\] of some of the cells, with its cell, and how far it is \[length\]: the first of
-    /// several; `None` of no cells.
+    /// Of the point nearest to a place \[length\] of some of the cells, and how far it is \[length\]; `None` of no cells.
     pub fn nearest(
         place: Point,
         (cells, among): (&Cells, impl Iterator<Item = usize>),
         reference: &Vectors,
-    ) -> Option<(Self, usize, f64)> {
+    ) -> Option<(Self, f64)> {
         let corners = |cell: &[u32]| cell.iter().map(|&i| reference.get(i as usize)).collect::<Vec<Point>>();
         let near = among.map(|cell| {
             let at = nearest(&corners(cells.of(cell)), place);
@@ -36,15 +30,20 @@ impl Around {
         let (cell, at, apart) = near.min_by(|a, b| a.2.total_cmp(&b.2))?;
         let particles = cells.of(cell).to_vec();
         let shares = shares(&corners(&particles), at);
-        Some((Self { particles, shares }, cell, apart))
+        Some((Self { cell, particles, shares }, apart))
+    }
+
+    /// The particles that stand for the place, with their shares: two of them on a side of the cell, one at a corner.
+    pub fn standing(&self) -> impl Iterator<Item = (usize, f64)> {
+        let all = self.particles.iter().zip(&self.shares).filter(|(_, share)| **share != 0.0);
+        all.map(|(&particle, &share)| (particle as usize, share))
     }
 
     /// The mean of what the particles have, by their shares, shape \[components\]; those that have nothing are left out.
     pub fn mean<const N: usize>(&self, has: impl Fn(usize) -> Option<[f64; N]>) -> Option<[f64; N]> {
         let (mut sum, mut whole) = ([0.0; N], 0.0);
-        for (&particle, share) in self.particles.iter().zip(&self.shares).filter(|(_, share)| **share != 0.0)
-        {
-            if let Some(values) = has(particle as usize) {
+        for (particle, share) in self.standing() {
+            if let Some(values) = has(particle) {
                 whole += share;
                 sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += share * value);
             }

@@ -65,6 +65,13 @@ pub fn element_of(corners: &[[f64; 2]], elastic: &Elastic, cut: bool) -> Result<
     whole_cell(corners, [&own, whole], elastic.averaged_dilatation().is_some())
 }
 
+/// Whether the cell has the energy of a displacement that is continuous from cell to cell, as Galerkin's method has it, and no
+/// other: triangles and whole rectangles, where dilatations are not averaged.
+pub fn is_conforming(corners: &[[f64; 2]], elastic: &Elastic, cut: bool) -> bool {
+    let is_rectangle = corners.len() == 4 && !cut && !is_oblique(corners);
+    elastic.averaged_dilatation().is_none() && (corners.len() == 3 || is_rectangle)
+}
+
 /// The cell by what it has to itself, and by the whole material where that is not all of it.
 fn whole_cell(
     corners: &[[f64; 2]],

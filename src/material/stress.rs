@@ -9,12 +9,14 @@ use std::ops::Range;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::cells::Cells;
+use super::cells::{Cells, Incidence};
 use super::dilatation;
-use super::elastic::Elastic;
+use super::elastic::{Elastic, von_mises};
+use super::place::Around;
 use super::stiffness::{ShapeError, mean_gradients, mean_strain};
 use crate::flock::rules::Rotation;
 use crate::flock::vectors::Vectors;
+use crate::geometry::lists::distinct;
 use crate::geometry::point::area;
 
 /// The state of a cell, or of the cells around a particle.
@@ -24,6 +26,8 @@ pub struct StressState {
     pub strain: [f64; 3],
     /// xx, yy, xy \[force / length^2\].
     pub components: [f64; 3],
+    /// zz, across the sheet: zero in plane stress \[force / length^2\].
+    pub across: f64,
     /// \[force / length^2\]
     pub von_mises: f64,
 }
@@ -35,7 +39,8 @@ impl StressState {
     }
 
     fn of(strain: [f64; 3], elastic: &Elastic) -> Self {
-        Self { strain, components: elastic.stress(strain), von_mises: elastic.von_mises(strain) }
+        let (components, across) = (elastic.stress(strain), elastic.stress_across(strain));
+        Self { strain, components, across, von_mises: von_mises(components, across) }
     }
 
     /// The principal strain largest in size \[1\].
@@ -66,54 +71,85 @@ fn strains(cells: &Cells, displacement: &Vectors, rotation: Rotation) -> Vec<[f6
     (0..cells.count()).into_par_iter().map(of_cell).collect()
 }
 
-/// Stress around each of `particles` particles: the mean over its cells, each weighted by its area. That smooths
-/// peaks, at free edges most of all. Where materials meet, stress jumps: there it is the mean on the side where von Mises
-/// stress is larger. `None` for particles in no cell, and in those left out by `counts` alone.
-pub fn at_particles(
-    cells: &Cells,
-    elastic: &Elastic,
-    of_cells: &[StressState],
+/// Means of the stress of the cells around particles, each weighted by its area. That smooths peaks, at free edges most of
+/// all. Where materials meet, stress jumps, and each side has its own.
+pub struct AroundParticles<'a> {
+    cells: &'a Cells,
+    elastic: &'a Elastic,
+    of_cells: &'a [StressState],
     particles: usize,
-    counts: impl Fn(usize) -> bool,
-) -> Vec<Option<StressState>> {
-    let regions = cells.inclusions.len() + 1;
-    let mut stresses = vec![None; particles];
-    for region in 0..regions as u32 {
-        let within = |cell: usize| cells.region_of(cell) == region && counts(cell);
-        let means = region_means(cells, (elastic, region), of_cells, particles, within);
-        for (known, mean) in stresses.iter_mut().zip(means) {
-            let is_larger = |known: &StressState| mean.is_some_and(|mean| mean.von_mises > known.von_mises);
-            if known.as_ref().is_none_or(is_larger) {
-                *known = mean;
-            }
-        }
-    }
-    stresses
+    incidence: Incidence,
+    areas: Vec<f64>,
 }
 
-/// Means over the cells of one region that count.
-fn region_means(
-    cells: &Cells,
-    (elastic, region): (&Elastic, u32),
-    of_cells: &[StressState],
-    particles: usize,
-    counts: impl Fn(usize) -> bool,
-) -> impl Iterator<Item = Option<StressState>> {
-    let elastic = *cells.material_of_region(region, elastic);
-    let mut sums = vec![([0.0; 3], 0.0); particles];
-    let areas: Vec<f64> = cells.shapes.iter().map(area).collect();
-    for (cell, corners) in cells.iter().enumerate().filter(|&(cell, _)| counts(cell)) {
-        let weight = areas[cells.kind[cell] as usize];
-        for &corner in corners {
-            let (sum, whole) = &mut sums[corner as usize];
-            sum.iter_mut().zip(of_cells[cell].strain).for_each(|(sum, strain)| *sum += weight * strain);
-            *whole += weight;
-        }
+impl<'a> AroundParticles<'a> {
+    /// Around each of so many particles, of the stress of each cell, shape \[cells\]; cells whose strain is no number count for
+    /// nothing. `elastic` is the material outside inclusions.
+    pub fn new(
+        cells: &'a Cells,
+        elastic: &'a Elastic,
+        of_cells: &'a [StressState],
+        particles: usize,
+    ) -> Self {
+        let (incidence, areas) = (cells.incidence(particles), cells.shapes.iter().map(area).collect());
+        Self { cells, elastic, of_cells, particles, incidence, areas }
     }
-    let mean = move |(sum, whole): ([f64; 3], f64)| {
-        (whole > 0.0).then(|| StressState::of(sum.map(|component| component / whole), &elastic))
-    };
-    sums.into_iter().map(mean)
+
+    /// The mean on the side where von Mises stress is larger; `None` for a particle in no cell that counts.
+    pub fn larger(&self, particle: usize) -> Option<StressState> {
+        if self.cells.inclusions.is_empty() {
+            return self.within(particle, 0);
+        }
+        let regions = distinct(self.regions_around(particle).map(|region| region as usize));
+        let sides = regions.into_iter().filter_map(|region| self.within(particle, region as u32));
+        sides.reduce(|known, side| if side.von_mises > known.von_mises { side } else { known })
+    }
+
+    /// The mean over the particle's cells of one region.
+    pub fn within(&self, particle: usize, region: u32) -> Option<StressState> {
+        let (mut sum, mut whole) = ([0.0; 3], 0.0);
+        let of_region = |&&cell: &&u32| self.cells.region_of(cell as usize) == region;
+        for &cell in self.incidence.of(particle).iter().filter(of_region) {
+            let strain = self.of_cells[cell as usize].strain;
+            if strain.iter().all(|component| !component.is_nan()) {
+                let weight = self.areas[self.cells.kind[cell as usize] as usize];
+                sum.iter_mut().zip(strain).for_each(|(sum, strain)| *sum += weight * strain);
+                whole += weight;
+            }
+        }
+        let elastic = self.cells.material_of_region(region, self.elastic);
+        (whole > 0.0).then(|| StressState::of(sum.map(|component| component / whole), elastic))
+    }
+
+    /// [`AroundParticles::larger`] of all particles, shape \[particles\].
+    pub fn all_larger(&self) -> Vec<Option<StressState>> {
+        (0..self.particles).into_par_iter().map(|particle| self.larger(particle)).collect()
+    }
+
+    /// At a place, from what its particles have; at those where materials meet on the side of the cell that it is in. A place that
+    /// is itself where they meet has the side of the larger von Mises stress, as its particles have.
+    pub fn at_place(&self, around: &Around, of_particles: &[Option<StressState>]) -> Option<StressState> {
+        let region = self.cells.region_of(around.cell);
+        let mut standing = around.standing().map(|(particle, _)| particle);
+        let first = standing.next()?;
+        let rest: Vec<usize> = standing.collect();
+        let on_all = |cell: u32| rest.iter().all(|&other| self.incidence.of(other).contains(&cell));
+        let mut shared = self.incidence.of(first).iter().filter(|&&cell| on_all(cell));
+        let is_between = shared.any(|&cell| self.cells.region_of(cell as usize) != region);
+        let of = |particle: usize| {
+            let is_within = is_between || self.regions_around(particle).all(|other| other == region);
+            let found = if is_within { of_particles[particle] } else { self.within(particle, region) }?;
+            let ([a, b, c], [xx, yy, xy]) = (found.strain, found.components);
+            Some([a, b, c, xx, yy, xy, found.across])
+        };
+        let [a, b, c, xx, yy, xy, across] = around.mean(of)?;
+        let components = [xx, yy, xy];
+        Some(StressState { strain: [a, b, c], components, across, von_mises: von_mises(components, across) })
+    }
+
+    fn regions_around(&self, particle: usize) -> impl Iterator<Item = u32> {
+        self.incidence.of(particle).iter().map(|&cell| self.cells.region_of(cell as usize))
+    }
 }
 
 /// Strain energy of the cells \[force length\] under displacements \[length\] of their corners.
@@ -289,7 +325,7 @@ mod tests {
             for (angle, rotation) in [(0.0, Rotation::Small), (2.0, Rotation::Corotated)] {
                 let u = pulled(&body, angle);
                 let found = of_cells(&cells, &elastic, &u, rotation);
-                let around = at_particles(&cells, &elastic, &found, body.count(), |_| true);
+                let around = AroundParticles::new(&cells, &elastic, &found, body.count()).all_larger();
                 for stress in found.iter().chain(around.iter().flatten()) {
                     let [xx, yy, xy] = stress.components;
                     assert!(
@@ -318,7 +354,7 @@ mod tests {
         let (_, _, elastic) = sheet(LatticeKind::SAMPLES[0]);
         let stretched: Vectors = [0.0, 1e-3, 1e-3, 0.0, 1e-3, 1e-3].into_iter().map(|u| [u, 0.0]).collect();
         let found = of_cells(&cells, &elastic, &stretched, Rotation::Small);
-        let around = at_particles(&cells, &elastic, &found, 7, |_| true);
+        let around = AroundParticles::new(&cells, &elastic, &found, 7).all_larger();
         let xx = |i: usize| around[i].expect("in a cell").strain[0];
         assert!((xx(0) - 1e-3).abs() < 1e-15 && (xx(1) - 0.25e-3).abs() < 1e-15 && xx(5).abs() < 1e-15);
         assert_eq!(around[6], None);

@@ -438,6 +438,11 @@ fn work_done_on_the_way_is_the_energy_that_a_body_bent_far_stores() {
     let back = "load_steps={schedule=[0.2, 0.4, 0.6, 0.8, 1.0, 0.8, 0.6, 0.4, 0.2, 0.0]}";
     let (left, [loads, _]) = stored("elastica", &[far[0], far[1], back]);
     assert!(left.abs() < 1e-9 * energy && loads.abs() < 1e-6 * energy, "{left} {loads}");
+
+    let unloaded =
+        |parts: &str| bundled("elastica", &[far[0], far[1], &format!("load_steps={{schedule={parts}}}")]).1;
+    assert!(unloaded("[0.2, 1.0, 0.0]").contains("and to zero in a body that gives it back"));
+    assert!(!unloaded("[0.2, 1.0, 0.2, 0.0]").contains("the work done on the way, summed up"));
 }
 
 #[test]

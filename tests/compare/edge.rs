@@ -92,7 +92,7 @@ fn a_bar_under_its_weight_has_no_stress_at_its_free_end() {
 }
 
 /// Two layers bonded together and bent: strain is linear in y, and stress jumps with the modulus.
-const LAYERS: &[&str] = &[
+const BONDED: &[&str] = &[
     "lattice.spacing=0.25",
     "body={ shape = { kind = \"rectangle\", max = [9.0, 3.0] }, inclusions = [{ shape = { kind = \"rectangle\", \
      min = [-1.0, 2.0], max = [10.0, 5.0] }, material = { kind = \"isotropic\", young = 6000.0, poisson = 0.3 } }] }",
@@ -105,13 +105,13 @@ const LAYERS: &[&str] = &[
 
 #[test]
 fn stress_is_recovered_beside_another_material() {
-    let (found, cautions) = measured(BENT, LAYERS);
+    let (found, cautions) = measured(BENT, BONDED);
     println!("{found:?} {cautions:?}");
     for (found, exact) in found.iter().zip([5.25, -2.125]) {
         assert!((found[0] / exact - 1.0).abs() < 0.02 && found[1].abs() < 0.02, "{found:?}, exact {exact}");
     }
     assert!(cautions.iter().any(|caution| caution.contains("where materials meet")), "{cautions:?}");
-    assert_eq!(planned(BENT, LAYERS), cautions);
+    assert_eq!(planned(BENT, BONDED), cautions);
 }
 
 #[test]
@@ -258,5 +258,77 @@ fn a_nearly_incompressible_slice_is_factorised() {
         let asked = scene.equilibrium.as_ref().expect("asked for");
         let (solver, why) = select_solver(&scene, &asked.request, &plan).expect("can be solved");
         assert_eq!(solver, expected, "{why}");
+    }
+}
+
+/// Two bonded layers without lateral contraction, stretched along them by a hundredth: 10 below y = 5, 1000 above.
+const TWO_LAYERS: &str = r#"
+title = "Two bonded layers, stretched along them"
+lattice = { kind = "hexagonal", spacing = 0.5 }
+material = { kind = "isotropic", young = 1000.0, poisson = 0.0 }
+rule = { mean = { kind = "material" } }
+stop = { steps = 1 }
+equilibrium = {}
+record = { places = [[10.0, 4.5], [10.0, 4.9], [10.0, 5.0], [10.0, 5.1], [20.0, 4.9], [20.0, 5.1], [0.0, 5.0]] }
+
+[body]
+shape = { kind = "rectangle", max = [20.0, 10.0] }
+
+[[body.inclusions]]
+shape = { kind = "rectangle", min = [0.0, 5.0], max = [20.0, 10.0] }
+material = { kind = "isotropic", young = 100000.0, poisson = 0.0 }
+
+[[roles]]
+region = { kind = "edge", side = "left" }
+role = "clamped"
+axis = "x"
+
+[[roles]]
+region = { kind = "edge", side = "bottom" }
+role = "clamped"
+axis = "y"
+
+[[roles]]
+region = { kind = "edge", side = "right" }
+role = "leader"
+axis = "x"
+motion = { kind = "velocity", per_step = [0.2, 0.0] }
+"#;
+
+#[test]
+fn stress_is_that_of_one_side_where_materials_meet() {
+    let found = compare_scene(&scene(TWO_LAYERS, &[])).unwrap_or_else(|error| panic!("{error}"));
+    let exact = [10.0, 10.0, 1000.0, 1000.0, 10.0, 1000.0, 1000.0];
+    for (at, exact) in found.places.iter().zip(exact) {
+        for (at, bound) in [(at.truth, 1e-6), (at.rule, 1e-5)] {
+            let off = [at.stress[0] - exact, at.stress[1], at.stress[2], at.von_mises - exact];
+            assert!(off.iter().all(|off| off.abs() < bound * exact), "{at:?}, exact {exact}");
+        }
+    }
+}
+
+#[test]
+fn between_tension_and_compression_there_is_no_von_mises_stress() {
+    // No row of particles in the middle.
+    let scene = scene(BENT, &["lattice.spacing=0.2", "record.places=[[5.0,0.5],[5.1,0.5]]"]);
+    let found = compare_scene(&scene).unwrap_or_else(|error| panic!("{error}"));
+    for at in found.places.iter().map(|at| at.rule) {
+        assert!(at.stress[0].abs() < 1e-3 && at.von_mises < 1e-2, "{at:?}: 6 at the edge");
+    }
+}
+
+#[test]
+fn energies_tell_the_error_of_conforming_cells_alone() {
+    let norm = |lattice: &str| {
+        let found = compare_scene(&scene(BENT, &[lattice])).unwrap_or_else(|error| panic!("{error}"));
+        found.comparison.energy_norm_rel
+    };
+    assert!(norm("lattice={kind=\"square\",spacing=0.25}").is_some());
+    for other in [
+        "lattice={kind=\"oblique\",a=0.25,b=0.25,angle=70.0}",
+        "lattice={kind=\"square\",spacing=0.25,orientation=30.0}",
+        "lattice={kind=\"honeycomb\",spacing=0.2}",
+    ] {
+        assert_eq!(norm(other), None, "{other}");
     }
 }

@@ -26,6 +26,15 @@ fn scenes_without_a_material_or_without_one_state_of_rest_are_refused() {
 }
 
 #[test]
+fn a_schedule_that_ends_with_a_part_of_the_load_is_refused() {
+    let of = |parts: &str| format!("load_steps={{ schedule = {parts} }}");
+    let asked = ["equilibrium={}", &of("[0.5, 1.0, 0.5]")];
+    refused("beam-loaded", &asked, &["load_steps.schedule", "the last part is 0.5", "end with 1"]);
+    let whole = compare_scene(&load("beam-loaded", &["equilibrium={}", &of("[0.5, 1.0]")]));
+    assert!(whole.is_ok());
+}
+
+#[test]
 fn a_body_that_the_truth_cannot_hold_is_refused_where_the_roles_stand() {
     let free = "roles=[{ region = { kind = \"edge\", side = \"right\" }, role = \"leader\", motion = { kind = \"reference\" } }]";
     refused(

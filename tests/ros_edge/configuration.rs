@@ -159,7 +159,7 @@ fn a_recording_of_the_node_of_one_robot_replays_to_the_bit() {
     let _peers = peers();
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("flight.mcap");
-    // They are sent through each other, so that it counts whose targets a node knows.
+    // It is sent through the others, so that it counts whose targets a node knows.
     let legs = "manoeuvres[0].legs=[{ seconds = 2.0, rotate = 90.0 }]";
     let file = square(&[&PATIENT[..], &[legs, "limits.clearance=0.6", "control.sweeps=1"]].concat());
     let names = Control::new(&file).expect("valid").formation().names.clone();

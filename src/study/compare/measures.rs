@@ -35,8 +35,8 @@ pub struct Comparison {
     /// error of the rule.
     pub energy_rel: f64,
     /// Energy norm of the error, sqrt(|E_truth - E_rule| / E_truth): by the orthogonality of B. G. Galerkin that is it
-    /// under small rotations where loads alone or moved supports alone drive a fitted body. `None` under other
-    /// conditions.
+    /// where loads alone or moved supports alone drive, under small rotations, a body of one material whose triangles and
+    /// rectangles have its shape. `None` under other conditions, cells cut by an outline among them.
     pub energy_norm_rel: Option<f64>,
     /// Strain energy of the cells at the rule's displacements \[force length\].
     pub strain_energy_rule: f64,

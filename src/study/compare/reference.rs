@@ -45,7 +45,7 @@ pub struct Setting<'a> {
 /// The displacement of a shape in equilibrium.
 #[derive(Clone, Debug)]
 pub struct Reference {
-    /// Displacement of each particle \[length\], shape \[particles\]; zero for those outside the shape.
+    /// Displacement of each particle \[length\], shape \[particles\]; zero for those more than a spacing outside the shape.
     pub displacement: Vectors,
     is_known: Vec<bool>,
     solution: ShapeSolution,
@@ -92,8 +92,11 @@ impl Reference {
         let places: Vec<Point> =
             reference.iter().zip(&is_known).filter(|(_, known)| **known).map(|(p, _)| p).collect();
         let mut found = solution.displacements_within(&places, spacing)?.into_iter();
-        let of = |&known: &bool| if known { found.next().unwrap_or_default() } else { [0.0; 2] };
-        let displacement = is_known.iter().map(of).collect();
+        // Beside the shape, but at corners of cells that are compared: as the nearest part of it goes on.
+        let beside = |p: Point| solution.displacements_within(&[p], spacing).map_or([0.0; 2], |at| at[0]);
+        let of =
+            |(p, &known): (Point, &bool)| if known { found.next().unwrap_or_default() } else { beside(p) };
+        let displacement = reference.iter().zip(&is_known).map(of).collect();
         Ok(Self { displacement, is_known, solution, spacing })
     }
 

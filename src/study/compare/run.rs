@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::measures::{Comparison, Sides, energy_norm, von_mises};
 use super::places::{PlaceComparison, compare_places};
 use super::reference::{Reference, Setting};
-use super::split::ErrorParts;
+use super::split::{ErrorParts, are_alike, outlines};
 use super::supports::supports;
 use crate::continuum::equilibrium::run_to_equilibrium;
 use crate::continuum::layout::Layout;
@@ -23,7 +23,7 @@ use crate::flock::vectors::Vectors;
 use crate::geometry::Point;
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
-use crate::scene::{LeaderMotion, Load, Scene, SceneError};
+use crate::scene::{LeaderMotion, Load, LoadSteps, Scene, SceneError};
 use crate::solve::stopwatch::Stopwatch;
 
 /// The truth of a scene's body in its material, under its loads, clamps and leaders.
@@ -146,7 +146,7 @@ pub fn compare(
         .map_err(|shape| scene.refuse("lattice", shape.to_string(), "use a lattice less slender"))?;
     let energy = truth.solution.strain_energy();
     comparison.strain_energy_truth = Some(energy);
-    comparison.energy_norm_rel = (is_orthogonal(scene, engine) && !cells.average_dilatations(elastic))
+    comparison.energy_norm_rel = is_orthogonal(scene, engine, &truth.layout)
         .then(|| energy_norm(comparison.strain_energy_rule, energy));
     comparison.seconds_rule = time.as_secs_f64();
     comparison.seconds_truth = truth.time.as_secs_f64();
@@ -190,10 +190,17 @@ fn cautions(scene: &Scene, truth: &Reference, effort: &Effort) -> Vec<String> {
     pushed.into_iter().chain(missed).collect()
 }
 
-/// Whether energies tell the error: those of a body that loads alone or moved supports alone drive, under small rotations.
-fn is_orthogonal(scene: &Scene, engine: &Engine) -> bool {
+/// Whether energies tell the error, by the orthogonality of B. G. Galerkin: of cells that have the shape of the body and the
+/// energy of one continuous displacement, which loads alone or moved supports alone drive under small rotations.
+fn is_orthogonal(scene: &Scene, engine: &Engine, layout: &Layout) -> bool {
     let is_moved = engine.changes().iter().any(|change| change.motion.is_some());
-    scene.is_fitted && scene.rotation() == Rotation::Small && (scene.loads.is_empty() || !is_moved)
+    let is_driven_by_one = scene.rotation() == Rotation::Small && (scene.loads.is_empty() || !is_moved);
+    let cells = layout.cells.as_ref().zip(scene.material.as_ref());
+    let are_conforming = cells.is_some_and(|(cells, elastic)| cells.are_conforming(elastic));
+    // Edges of inclusions need not run along sides of cells.
+    let have_shape = layout.partition.is_none()
+        && outlines(layout).is_some_and(|(outline, of_cells)| are_alike(outline, &of_cells));
+    scene.is_fitted && is_driven_by_one && are_conforming && have_shape
 }
 
 /// The plan of a scene, its leaders led by this truth of its body or of a finer one.
@@ -212,10 +219,17 @@ fn led_by(truth: &Reference) -> impl Fn(&Vectors) -> Vec<Point> + '_ {
     }
 }
 
-/// The reference covers one body in one equilibrium state.
-fn require_comparable(scene: &Scene) -> Result<(), SceneError> {
+/// The reference covers one body in one equilibrium state, under the whole load.
+pub(crate) fn require_comparable(scene: &Scene) -> Result<(), SceneError> {
     if scene.material.is_none() {
         return Err(without_material(scene));
+    }
+    if let Some(LoadSteps::Solved(parts)) = &scene.load_steps
+        && let Some(last) = parts.last().filter(|&&last| last != 1.0)
+    {
+        let message = format!("the truth is that of the whole load, and the last part is {last}");
+        let help = "let the schedule end with 1, or leave it out and give that part of the loads and motions";
+        return Err(scene.refuse("load_steps.schedule", message, help));
     }
     if !scene.actions.is_empty() {
         let message = "the truth knows one body, and this one is changed on its way";

@@ -10,6 +10,7 @@ use super::reference::{Reference, Setting};
 use super::run::{SceneReference, plan_led_by, refused};
 use super::supports::supports;
 use crate::continuum::equilibrium::solve_equilibrium;
+use crate::continuum::layout::Layout;
 use crate::fem::{Effort, Holding};
 use crate::flock::vectors::{Vectors, distance};
 use crate::geometry::Point;
@@ -77,14 +78,24 @@ fn equilibrium(scene: &Scene, truth: &Reference) -> Option<Vectors> {
     is_known.then(|| (0..engine.body().count()).map(|i| engine.displacement(i)).collect())
 }
 
+/// The outline of the shape, and that of its cells.
+pub(super) fn outlines(layout: &Layout) -> Option<(&Outline, Outline)> {
+    let of_cells = layout.cells.as_ref()?.outline(&layout.body.reference).ok()?;
+    Some((layout.outline.as_ref()?, of_cells))
+}
+
+/// Whether the cells have the shape itself.
+pub(super) fn are_alike(outline: &Outline, of_cells: &Outline) -> bool {
+    let agrees = |a: f64, b: f64| (a - b).abs() <= 1e-9 * b;
+    agrees(of_cells.area(), outline.area()) && agrees(of_cells.length(), outline.length())
+}
+
 /// The truth of the shape that the cells have; the same where that is the shape itself.
 fn reference_of_cells(scene: &Scene, truth: &SceneReference) -> Result<Option<Vectors>, SceneError> {
     let layout = &truth.layout;
-    let (Some(outline), Some(cells)) = (&layout.outline, &layout.cells) else { return Ok(None) };
+    let Some((outline, of_cells)) = outlines(layout) else { return Ok(None) };
     let reference = &layout.body.reference;
-    let Ok(of_cells) = cells.outline(reference) else { return Ok(None) };
-    let agrees = |a: f64, b: f64| (a - b).abs() <= 1e-9 * b;
-    if agrees(of_cells.area(), outline.area()) && agrees(of_cells.length(), outline.length()) {
+    if are_alike(outline, &of_cells) {
         return Ok(Some(truth.solution.displacement.clone()));
     }
     // Edges of inclusions that end on the outline do not end on that of the cells.

@@ -5,20 +5,17 @@
 //! to the truth; then the coarsest tolerance and, where they suffice, singles are taken that leave it so. Every error is
 //! that of a solved body, to which the truth's own is added: what is delivered is what was measured.
 
+use super::alike::{extents_of_roles, held_elsewhere, require_alike};
 use super::grid::{RuleChoice, body_overrides};
 use super::study::{Load as LoadScene, error_of, reason};
 use crate::continuum::equilibrium::solve_equilibrium;
-use crate::continuum::layout::Layout;
 use crate::continuum::run::Outcome;
-use crate::flock::region::Region;
 use crate::flock::role::Role;
-use crate::flock::vectors::distance;
-use crate::geometry::point::bounds;
 use crate::scene::raw::RawMean;
-use crate::scene::{Load, Scene, SceneError, SceneRegion};
+use crate::scene::{Scene, SceneError};
 use crate::solve::equilibrium::{Precision, Request};
 use crate::study::compare::reference::Effort;
-use crate::study::compare::run::{SceneReference, plan_led_by, reference_of};
+use crate::study::compare::run::{SceneReference, plan_led_by, reference_of, require_comparable};
 
 /// Halvings tried before giving up.
 const MOST_HALVINGS: u32 = 5;
@@ -31,6 +28,9 @@ const TIGHT: f64 = 1e-9;
 
 /// Of the accuracy, how much the truth's own error may use up.
 const OF_TRUTH: f64 = 0.05;
+
+const FINER: &str = "the accuracy takes a finer body";
+const OR: &str = "write a smaller spacing, or ask for less";
 
 /// A scene in the setting that was chosen.
 #[derive(Debug)]
@@ -58,6 +58,7 @@ pub fn choose(scene: Scene, load: LoadScene<'_>) -> Result<Chosen, SceneError> {
         let words = format!("accuracy {} %: the paper's rule at the written spacing\n", 100.0 * accuracy);
         return Ok(Chosen { scene, words, estimate: None });
     }
+    require_comparable(&scene)?;
     let mut nearest = f64::INFINITY;
     let (mut particles, mut written) = (0, None);
     for halvings in 0..=MOST_HALVINGS {
@@ -68,20 +69,10 @@ pub fn choose(scene: Scene, load: LoadScene<'_>) -> Result<Chosen, SceneError> {
         }
         let body = Body::new(&scene, load, part, accuracy)?;
         let extents = extents_of_roles(&body.scene, &body.truth.layout)?;
-        let mut pairs = written.get_or_insert_with(|| extents.clone()).iter().zip(&extents);
-        if let Some(((key, before), (_, now))) = pairs.find(|(before, now)| {
-            let apart = |k: usize| distance(before.1[k], now.1[k]);
-            apart(0).max(apart(1)) > 1e-6 * body.scene.lattice.spacing()
-        }) {
-            let message = format!(
-                "the accuracy takes a finer body, of which it holds particles from {:?} to {:?} instead of {:?} to {:?}",
-                now[0], now[1], before[0], before[1]
-            );
-            return Err(scene.refuse(
-                key,
-                message,
-                "pick pieces of the outline, write a smaller spacing, or ask for less",
-            ));
+        let written = written.get_or_insert_with(|| extents.clone());
+        if let Some((key, held)) = held_elsewhere(written, &extents, body.scene.lattice.spacing()) {
+            let help = format!("pick pieces of the outline, {OR}");
+            return Err(scene.refuse(&key, format!("{FINER}, {held}"), help));
         }
         let solved =
             body.solve(&[format!("equilibrium.tolerance={TIGHT:e}"), DOUBLES.into(), ANY_SOLVER.into()])?;
@@ -90,7 +81,11 @@ pub fn choose(scene: Scene, load: LoadScene<'_>) -> Result<Chosen, SceneError> {
         if nearest <= accuracy {
             return body.cheapest(accuracy, solved.error);
         }
-        require_refinable(&scene, &body.truth.layout)?;
+        require_alike(&scene, &body.truth.layout, (FINER, OR))?;
+        if !scene.record.probes.is_empty() {
+            let message = format!("{FINER}, in which these ids are other particles");
+            return Err(scene.refuse("record.probes", message, format!("record.places instead, {OR}")));
+        }
     }
     let message = format!(
         "the error is still {:.2} % at {particles} particles, after {MOST_HALVINGS} halvings of the spacing or as many as \
@@ -134,7 +129,7 @@ impl<'a> Body<'a> {
         let own = truth.solution.error().displacement;
         if own > 0.5 * accuracy {
             let message = format!(
-                "the truth itself is not known so well: on {} nodes the truth states an error of {:.4} % of its own, and where \
+                "the truth itself is not known so well: on {} nodes the truth states an error of {:.1e} % of its own, and where \
                  single points hold or push a body it always will",
                 truth.solution.nodes(),
                 100.0 * own
@@ -230,52 +225,4 @@ fn words(solved: &Solved, accuracy: f64, part: f64) -> String {
         request.tolerance,
         request.precision
     )
-}
-
-/// A key, and from where to where the particles are that it picks \[length\].
-type Extent = (String, [[f64; 2]; 2]);
-
-/// The roles that particles take by place.
-fn extents_of_roles(scene: &Scene, layout: &Layout) -> Result<Vec<Extent>, SceneError> {
-    let by_place = |region: &SceneRegion| {
-        matches!(region, SceneRegion::Known(Region::Box { .. } | Region::Disc { .. } | Region::Edge { .. }))
-    };
-    let by_place = scene.roles.iter().enumerate().filter(|(_, entry)| by_place(&entry.region));
-    by_place
-        .map(|(k, entry)| {
-            let particles = layout.pick(scene, &format!("roles[{k}]"), &entry.region)?;
-            let (low, high) = bounds(particles.iter().map(|&i| layout.body.reference.get(i)));
-            Ok((format!("roles[{k}].region"), [low, high]))
-        })
-        .collect()
-}
-
-/// What a finer body has others of, or more: particles with these ids, outermost ones, pushed ones.
-fn require_refinable(scene: &Scene, layout: &Layout) -> Result<(), SceneError> {
-    const OR: &str = "write a smaller spacing, or ask for less";
-    let refuse = |key: &str, what: &str, help: &str| {
-        Err(scene.refuse(key, format!("the accuracy takes a finer body, {what}"), format!("{help}, {OR}")))
-    };
-    if let Some(k) = scene.loads.iter().position(|load| matches!(load, Load::Force { .. })) {
-        return refuse(&format!("loads[{k}].force"), "in which it pushes more particles", "give a traction");
-    }
-    for (key, region) in scene.regions() {
-        match region {
-            SceneRegion::Known(Region::Ids(_)) => {
-                return refuse(&key, "in which these ids are other particles", "pick particles by place");
-            }
-            SceneRegion::Outermost(side) if !layout.is_flat(*side) => {
-                return refuse(
-                    &key,
-                    "in which less of a side that is not straight is outermost",
-                    "pick pieces of the outline",
-                );
-            }
-            _ => {}
-        }
-    }
-    if !scene.record.probes.is_empty() {
-        return refuse("record.probes", "in which these ids are other particles", "record.places instead");
-    }
-    Ok(())
 }

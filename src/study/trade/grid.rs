@@ -100,7 +100,17 @@ impl std::fmt::Display for Setting {
     }
 }
 
-/// Overrides that give a scene this rule at this part of its spacing.
+/// Whether a body of this part of the scene's spacing has the extent of the scene's own: a grid has a whole number of gaps.
+pub fn divides(scene: &Scene, part: f64) -> bool {
+    match scene.raw.body.shape {
+        RawShape::Grid { columns, rows } => {
+            [columns, rows].iter().all(|&count| (f64::from(count - 1) / part).fract() == 0.0)
+        }
+        _ => true,
+    }
+}
+
+/// Overrides that give a scene this rule at this part of its spacing, which [divides](divides) it.
 pub fn body_overrides(scene: &Scene, rule: RuleChoice, part: f64) -> Vec<String> {
     let mut overrides = Vec::new();
     let mean = match (rule, &scene.raw.rule.mean) {

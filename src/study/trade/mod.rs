@@ -6,6 +6,7 @@
 //! settings ([`Study::front`]). [`choose`] goes the other way: from an accuracy to the setting.
 
 mod accuracy;
+mod alike;
 mod grid;
 mod study;
 

@@ -4,15 +4,18 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::grid::{Grid, RuleChoice, Setting, body_overrides, settings, solver_overrides};
+use super::alike::{Extent, extents_of_roles, held_elsewhere, require_alike};
+use super::grid::{Grid, RuleChoice, Setting, body_overrides, divides, settings, solver_overrides};
 use crate::continuum::equilibrium::solve_equilibrium;
+use crate::continuum::layout::Layout;
+use crate::continuum::plan::Plan;
 use crate::continuum::run::Outcome as RunOutcome;
 use crate::flock::role::Role;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::{Scene, SceneError};
 use crate::solve::stopwatch::Stopwatch;
 use crate::study::compare::reference::{Effort, Reference};
-use crate::study::compare::run::{SceneReference, plan_led_by, reference_of};
+use crate::study::compare::run::{SceneReference, plan_led_by, reference_of, require_comparable};
 
 /// The outcome of a setting.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -77,7 +80,14 @@ pub type Load<'a> = &'a dyn Fn(&[String]) -> Result<Scene, SceneError>;
 /// study.
 pub fn run(load: Load<'_>, grid: &Grid, progress: &mut dyn FnMut(&Setting)) -> Result<Study, SceneError> {
     let scene = load(&[])?;
-    let truth = finest_reference(load, &scene, grid)?;
+    require_comparable(&scene)?;
+    let takes = ("the study takes finer bodies", "or compare this spacing alone");
+    let unlike = require_alike(&scene, &Layout::new(&scene)?, takes).err();
+    let truth = match &unlike {
+        None => finest_reference(load, &scene, grid)?,
+        Some(_) => reference_of(&scene, &Effort::default())?,
+    };
+    let held = extents_of_roles(&scene, &truth.layout)?;
     let mut study = Study {
         name: scene.name.clone(),
         title: scene.raw.title.clone(),
@@ -91,7 +101,16 @@ pub fn run(load: Load<'_>, grid: &Grid, progress: &mut dyn FnMut(&Setting)) -> R
     for rule in RuleChoice::ALL {
         for &spacing in &grid.spacings {
             let overrides = body_overrides(&scene, rule, spacing);
-            let particles = match load(&overrides).and_then(|scene| plan_led_by(&scene, &truth.solution)) {
+            let planned = match &unlike {
+                Some(error) if spacing != 1.0 => Err(error.clone()),
+                _ if !divides(&scene, spacing) => Err(scene.refuse(
+                    "body.shape",
+                    "the gaps of this grid are no multiple of so many",
+                    "give another number of columns and rows",
+                )),
+                _ => load(&overrides).and_then(|scene| plan_alike(&scene, &held, &truth.solution)),
+            };
+            let particles = match planned {
                 Ok(plan) if plan.count() <= grid.max_particles => plan.count(),
                 Ok(plan) => {
                     left_out.push(plan.count());
@@ -130,12 +149,24 @@ pub fn run(load: Load<'_>, grid: &Grid, progress: &mut dyn FnMut(&Setting)) -> R
     }
 }
 
+/// The plan of a body that is held where the truth is.
+fn plan_alike(scene: &Scene, held: &[Extent], truth: &Reference) -> Result<Plan, SceneError> {
+    let own = extents_of_roles(scene, &Layout::new(scene)?)?;
+    match held_elsewhere(held, &own, scene.lattice.spacing()) {
+        None => plan_led_by(scene, truth),
+        Some((key, elsewhere)) => {
+            let message = format!("another spacing makes another body, {elsewhere}");
+            Err(scene.refuse(&key, message, "pick pieces of the outline"))
+        }
+    }
+}
+
 /// The truth of the finest body that is within bounds.
 fn finest_reference(load: Load<'_>, scene: &Scene, grid: &Grid) -> Result<SceneReference, SceneError> {
     let mut spacings = grid.spacings.clone();
     spacings.sort_by(f64::total_cmp);
     let fits = |truth: &SceneReference| truth.layout.body.count() <= grid.max_particles;
-    for &spacing in spacings.iter().filter(|&&spacing| spacing <= 1.0) {
+    for &spacing in spacings.iter().filter(|&&spacing| spacing <= 1.0 && divides(scene, spacing)) {
         let finer = load(&body_overrides(scene, RuleChoice::Material, spacing));
         if let Some(truth) =
             finer.ok().and_then(|scene| reference_of(&scene, &Effort::default()).ok()).filter(fits)
@@ -266,11 +297,23 @@ impl fmt::Display for Study {
             let best = best(rule);
             if best.is_finite() {
                 writeln!(f, "the {} rule comes as near as {:.3} %", rule.name(), 100.0 * best)?;
-            } else if let Some(reason) = self.points.iter().find_map(|point| match &point.outcome {
-                Outcome::Refused { reason } if point.setting.rule == rule => Some(reason),
-                _ => None,
-            }) {
-                writeln!(f, "the {} rule is not to be had: {reason}", rule.name())?;
+            }
+            let refused = self.points.iter().filter(|point| point.setting.rule == rule).filter_map(|point| {
+                let Outcome::Refused { reason } = &point.outcome else { return None };
+                Some((point.setting.spacing, reason.as_str()))
+            });
+            let mut reasons: Vec<(&str, Vec<f64>)> = Vec::new();
+            for (spacing, reason) in refused {
+                match reasons.iter_mut().find(|(known, _)| *known == reason) {
+                    Some((_, spacings)) if spacings.contains(&spacing) => {}
+                    Some((_, spacings)) => spacings.push(spacing),
+                    None => reasons.push((reason, vec![spacing])),
+                }
+            }
+            for (reason, spacings) in reasons {
+                let spacings: Vec<String> = spacings.iter().map(f64::to_string).collect();
+                let (rule, spacings) = (rule.name(), spacings.join(", "));
+                writeln!(f, "the {rule} rule at {spacings} x spacing is not to be had: {reason}")?;
             }
         }
         Ok(())
