@@ -30,6 +30,20 @@ pub struct AtPlace {
 /// How far outside the body a place is that was rounded when it was written \[spacings\].
 const ROUNDING: f64 = 1e-3;
 
+/// The region of the shape that a place is in, and whether it is where two meet; of a body in whole cells, whose regions are theirs,
+/// unknown.
+fn region(scene: &Scene, place: [f64; 2]) -> (Option<u32>, bool) {
+    let rounding = ROUNDING * scene.lattice.spacing();
+    let within = |tolerance: f64| {
+        let last = scene.inclusions.iter().rposition(|part| part.shape.contains(place, tolerance));
+        last.map_or(0, |k| k as u32 + 1)
+    };
+    match scene.is_fitted {
+        true => (Some(within(0.0)), within(rounding) != within(-rounding)),
+        false => (None, false),
+    }
+}
+
 /// The particles around each place of `record.places`; of those that another rank has, where each has a part of the body, none.
 ///
 /// # Errors
@@ -81,7 +95,9 @@ pub fn at_places(scene: &Scene, engine: &Engine, stresses: &Stresses) -> Vec<AtP
     let at = |(k, around): (usize, Option<Around>)| {
         let around = around?;
         let [ux, uy] = around.mean(|i| Some(engine.displacement(i))).unwrap_or_default();
-        let found = sides.as_ref().and_then(|sides| sides.at_place(&around, &stresses.particles));
+        let found = sides.as_ref().and_then(|sides| {
+            sides.at_place(&around, region(scene, scene.record.places[k]), &stresses.particles)
+        });
         let of = |StressState { components: [xx, yy, xy], von_mises, .. }| [xx, yy, xy, von_mises];
         let [xx, yy, xy, von_mises] = found.map_or([f64::NAN; 4], of);
         Some((k, [ux, uy, xx, yy, xy, von_mises].map(f64::to_bits)))

@@ -20,6 +20,7 @@ use crate::flock::rules::{FeedbackReference, Mean, Rotation};
 use crate::geometry::point::area;
 use crate::material::outline_loads::Resultant;
 use crate::scene::raw::RawLoad;
+use crate::scene::text::counted;
 use crate::scene::{LoadSteps, Scene, SceneError, Weights as SceneWeights};
 use crate::sweep::{Order, Sweep};
 
@@ -183,7 +184,7 @@ fn facts(
         (None, Some(tolerance)) => {
             format!("at residual {tolerance:e}, at the latest after {} steps", plan.stop.steps)
         }
-        (None, None) => format!("after {} steps", plan.stop.steps),
+        (None, None) => format!("after {}", counted(plan.stop.steps, "step")),
     };
     let bonds = neighbour_entries(plan);
     let about = if plan.setup.present_radius.is_some() { "about " } else { "" };

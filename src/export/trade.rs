@@ -75,9 +75,9 @@ pub(super) fn chart(study: &Study) -> Chart {
     all.retain(|series| !series.points.is_empty());
     all.push(series("Pareto-optimal".into(), "ink", Style::Front, study.front().into_iter()));
     let note = format!(
-        "{} settings, median of {} runs each, from the scene to rest; error against finite elements on {} nodes",
+        "{} settings, median of {} each, from the scene to rest; error against finite elements on {} nodes",
         study.points.len(),
-        study.repeats,
+        counted(study.repeats, "run"),
         study.truth_nodes
     );
     let axes = [Axis::log("time", "s"), Axis::log("relative L2 error of the displacement", "")];

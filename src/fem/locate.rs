@@ -27,26 +27,23 @@ impl<'m> Locator<'m> {
         Locator { mesh, boxes: BoxTree::new((0..mesh.cell_count()).map(of_cell)) }
     }
 
-    /// The cells that hold `p` \[m\], with the reference coordinates there: several on their sides and corners.
-    pub fn holding(&self, p: [f64; 2]) -> impl Iterator<Item = (usize, [f64; 2])> {
-        let place =
-            move |cell| invert(self.mesh, cell, p).filter(|&place| self.mesh.kind().contains(place, SLACK));
-        self.boxes.overlapping(p, p).filter_map(move |cell| Some((cell, place(cell)?)))
-    }
-
-    /// The cell nearest to a point that is in none, with reference coordinates that continue it to the point; `None`
-    /// if it is further away than `reach` \[m\]. Of cells equally far it is the lowest-numbered one.
-    pub fn nearest(&self, p: [f64; 2], reach: f64) -> Option<(usize, [f64; 2])> {
+    /// The cells that hold `p` \[m\], or are no further than `reach` \[m\] from it, with reference coordinates that continue them to
+    /// it: the nearest first, of those equally near the lowest-numbered one.
+    pub fn near(&self, p: [f64; 2], reach: f64) -> Vec<(usize, [f64; 2])> {
         let kind = self.mesh.kind();
         let near = self.boxes.overlapping(p.map(|v| v - reach), p.map(|v| v + reach)).filter_map(|cell| {
             let place = invert(self.mesh, cell, p)?;
+            if kind.contains(place, SLACK) {
+                return Some((0.0, cell, place));
+            }
             let within =
                 kind.shape(kind.clamped(place)).interpolate(&self.mesh.positions(cell)[..kind.nodes()]);
             let apart = distance(p, within);
-            (apart <= reach).then_some((apart, cell, place))
+            (0.0 < apart && apart <= reach).then_some((apart, cell, place))
         });
-        let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        nearest.map(|(_, cell, place)| (cell, place))
+        let mut near: Vec<_> = near.collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        near.into_iter().map(|(_, cell, place)| (cell, place)).collect()
     }
 }
 
@@ -92,13 +89,14 @@ mod tests {
                 let (r, t) =
                     (1.02 + 0.94 * (k as f64 * 0.618).fract(), 0.01 + 1.18 * (k as f64 * 0.414).fract());
                 let p = [r * t.cos(), r * t.sin()];
-                let (cell, place) = locator.holding(p).next().unwrap_or_else(|| panic!("{kind:?} {p:?}"));
+                let (cell, place) =
+                    locator.near(p, 0.0).first().copied().unwrap_or_else(|| panic!("{kind:?} {p:?}"));
                 let q = kind.shape(place).interpolate(&mesh.positions(cell)[..kind.nodes()]);
                 assert!((p[0] - q[0]).hypot(p[1] - q[1]) < 1e-12, "{kind:?} {p:?} {q:?}");
             }
             for p in [[0.0, 0.0], [0.9, 0.1], [5.0, 5.0], [-1.0, 0.5], [f64::NAN, 0.0], [f64::INFINITY, 1.0]]
             {
-                assert!(locator.holding(p).next().is_none(), "{kind:?} {p:?}");
+                assert!(locator.near(p, 0.0).is_empty(), "{kind:?} {p:?}");
             }
         }
     }

@@ -291,7 +291,7 @@ impl ShapeSolution {
     pub(crate) fn stress_within(&self, points: &[Point], reach: f64) -> Result<Vec<Stress>, FemError> {
         let (x, y): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p[0], p[1])).unzip();
         let (parted, _) = self.solution.parted();
-        parted.interpolated_within(&nodal_stress(&parted), &x, &y, reach)
+        parted.interpolated_within(&nodal_stress(&parted), [&x, &y], [self.reach, reach])
     }
 }
 

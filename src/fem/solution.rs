@@ -110,7 +110,7 @@ impl Solution {
             let (cell, shape) = &cells[0];
             shape.interpolate(&self.of_cell(*cell)[..n])
         };
-        self.at_places(x, y, reach, first)
+        self.at_places(x, y, [0.0, reach], first)
     }
 
     /// The same field on a mesh where cells share nodes with cells of their own material alone, so that stress at a node is
@@ -122,17 +122,16 @@ impl Solution {
     }
 
     /// Stress known at the nodes, shape \[nodes\], at each point (x, y) \[m\]; points no further outside than `reach` \[m\]
-    /// take the nearest cell, continued to them. Where cells that hold a point have different stresses there, it is the one of
-    /// the largest von Mises stress.
+    /// take the nearest cell, continued to them. No further than `between` \[m\] from cells of several materials it is the one of the largest
+    /// von Mises stress.
     ///
     /// # Errors
     /// As for [`Solution::displacements_at`].
-    pub(crate) fn interpolated_within(
+    pub(super) fn interpolated_within(
         &self,
         at_nodes: &[Stress],
-        x: &[f64],
-        y: &[f64],
-        reach: f64,
+        [x, y]: [&[f64]; 2],
+        [between, reach]: [f64; 2],
     ) -> Result<Vec<Stress>, FemError> {
         let all = |component: fn(&Stress) -> f64| at_nodes.iter().map(component).collect::<Vec<f64>>();
         let (xx, yy, xy, zz) = (all(|s| s.xx), all(|s| s.yy), all(|s| s.xy), all(|s| s.zz));
@@ -142,18 +141,23 @@ impl Solution {
             let [shear, out] = shape.interpolate(&self.mesh.gather(*cell, &xy, &zz)[..n]);
             Stress { xx: in_x, yy: in_y, xy: shear, zz: out }
         };
+        let kind = |cell: usize| self.inclusions.kind(cell, &self.material);
         let by_size = |a: &Stress, b: &Stress| a.von_mises().total_cmp(&b.von_mises());
-        let largest =
-            |cells: &[(usize, Shape)]| cells.iter().map(in_cell).max_by(by_size).unwrap_or_default();
-        self.at_places(x, y, reach, largest)
+        let largest = |cells: &[(usize, Shape)]| {
+            let is_nearest = |&k: &usize| cells[..k].iter().all(|nearer| kind(nearer.0) != kind(cells[k].0));
+            let of_kinds = (0..cells.len()).filter(is_nearest).map(|k| in_cell(&cells[k]));
+            of_kinds.max_by(by_size).unwrap_or_default()
+        };
+        self.at_places(x, y, [between, reach], largest)
     }
 
-    /// `value` of the cells that hold each point, ascending and never none, with their shape functions there.
+    /// `value` of the cells that hold each point or are no further than `near` from it, the nearest first and never none, with their shape
+    /// functions there.
     fn at_places<T>(
         &self,
         x: &[f64],
         y: &[f64],
-        reach: f64,
+        [near, reach]: [f64; 2],
         value: impl Fn(&[(usize, Shape)]) -> T,
     ) -> Result<Vec<T>, FemError> {
         if x.len() != y.len() {
@@ -161,11 +165,11 @@ impl Solution {
         }
         let locator = Locator::new(&self.mesh);
         let at = |(index, (&x, &y)): (usize, (&f64, &f64))| {
-            let mut cells: Vec<(usize, [f64; 2])> = locator.holding([x, y]).collect();
-            if cells.is_empty() && reach > 0.0 {
-                cells.extend(locator.nearest([x, y], reach));
+            let mut cells = locator.near([x, y], near);
+            if cells.is_empty() && reach > near {
+                cells = locator.near([x, y], reach);
+                cells.truncate(1);
             }
-            cells.sort_by_key(|&(cell, _)| cell);
             let cells = cells.into_iter().map(|(cell, place)| (cell, self.mesh.kind().shape(place)));
             let cells: Vec<(usize, Shape)> = cells.collect();
             if cells.is_empty() { Err(FemError::OutsideMesh { index, x, y }) } else { Ok(value(&cells)) }

@@ -1,6 +1,6 @@
 //! Where edges and arcs meet.
 
-use super::piece::Piece;
+use super::piece::{Arc, Piece};
 use super::point::distance;
 
 /// Where the segment from `a` to `b` meets a piece: shares of the way along either, from 0 to 1.
@@ -49,6 +49,10 @@ pub fn meetings(a: [f64; 2], b: [f64; 2], piece: &Piece) -> Vec<[f64; 2]> {
 /// pieces that overlap, where the common part begins and ends. `near` is the length below which nothing differs.
 pub fn crossings(a: &Piece, b: &Piece, near: f64) -> Vec<[f64; 2]> {
     let mut found = match (&a.arc, &b.arc) {
+        // Rounding makes of it two points, or none.
+        _ if let Some(p) = touching(a, b, near) => {
+            on(a, p, near).zip(on(b, p, near)).map(Into::into).into_iter().collect()
+        }
         (None, _) => meetings(a.from, a.to, b),
         (_, None) => meetings(b.from, b.to, a).into_iter().map(|[s, t]| [t, s]).collect(),
         (Some(one), Some(other)) => {
@@ -78,8 +82,64 @@ pub fn crossings(a: &Piece, b: &Piece, near: f64) -> Vec<[f64; 2]> {
     found.into_iter().map(|[s, t]| [snapped(a, s), snapped(b, t)]).collect()
 }
 
+/// Where an arc and an edge, or two arcs, have one direction, if they go past each other there by less than `near`.
+fn touching(a: &Piece, b: &Piece, near: f64) -> Option<[f64; 2]> {
+    let is_on = |arc: &Arc, p: [f64; 2]| (distance(p, arc.centre) - arc.radius).abs() <= near;
+    match (&a.arc, &b.arc) {
+        (None, None) => None,
+        (Some(_), None) => touching(b, a, near),
+        (None, Some(arc)) => {
+            let t = a.nearest(arc.centre);
+            Some(a.point(t)).filter(|&foot| 0.0 < t && t < 1.0 && is_on(arc, foot))
+        }
+        (Some(one), Some(other)) => {
+            let off = [0, 1].map(|k| other.centre[k] - one.centre[k]);
+            let apart = off[0].hypot(off[1]);
+            let at = |side: f64| [0, 1].map(|k| one.centre[k] + side * one.radius * (off[k] / apart));
+            match [1.0, -1.0].map(at).map(|p| is_on(other, p).then_some(p)) {
+                // Those of one circle have a part in common, if anything.
+                [Some(_), Some(_)] => None,
+                [p, q] => p.or(q),
+            }
+        }
+    }
+}
+
 /// How far along a piece a point lies, if it lies on it.
 pub fn on(piece: &Piece, p: [f64; 2], near: f64) -> Option<f64> {
     let t = piece.nearest(p);
     (distance(piece.point(t), p) <= near).then_some(t)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+
+    #[test]
+    fn lines_that_touch_but_for_rounding_meet_once() {
+        let near = 1e-9;
+        for k in 0..200 {
+            let x = f64::from(k) * 0.1 - 9.0;
+            let disc = Piece::arc([x, -2.0], 3.0, 0.1, TAU);
+            let edge = Piece::edge([-20.0, -5.0], [20.0, -5.0]);
+            for found in [crossings(&edge, &disc, near), crossings(&disc, &edge, near)] {
+                assert_eq!(found.len(), 1, "{x}: {found:?}");
+            }
+            // From without and from within.
+            for (radius, apart) in [(1.7, 4.7), (1.2, 1.8)] {
+                let (sin, cos) = x.sin_cos();
+                let other = Piece::arc([x + apart * cos, -2.0 + apart * sin], radius, 2.0, TAU);
+                let found = crossings(&disc, &other, near);
+                let meets = [x + 3.0 * cos, -2.0 + 3.0 * sin];
+                // An end that is there is found as well.
+                let is_there = |at: &[f64; 2]| distance(disc.point(at[0]), meets) < 1e-8;
+                assert!(!found.is_empty() && found.iter().all(is_there), "{x} {radius}: {found:?}");
+            }
+        }
+        // Those that cross still do so twice.
+        let [one, other] = [0.0, 4.0].map(|x| Piece::arc([x, 0.0], 3.0, 0.1, TAU));
+        assert_eq!(crossings(&one, &other, near).len(), 2);
+    }
 }

@@ -126,16 +126,25 @@ impl<'a> AroundParticles<'a> {
         (0..self.particles).into_par_iter().map(|particle| self.larger(particle)).collect()
     }
 
-    /// At a place, from what its particles have; at those where materials meet on the side of the cell that it is in. A place that
-    /// is itself where they meet has the side of the larger von Mises stress, as its particles have.
-    pub fn at_place(&self, around: &Around, of_particles: &[Option<StressState>]) -> Option<StressState> {
-        let region = self.cells.region_of(around.cell);
+    /// At a place, from what its particles have; at those where materials meet on the side of the region that it is in, or, where
+    /// that is not known, of its cell. A place that is itself where they meet, as is known or as the cells have it, has the side of the larger
+    /// von Mises stress, as its particles have.
+    pub fn at_place(
+        &self,
+        around: &Around,
+        (region, is_known_to_be_between): (Option<u32>, bool),
+        of_particles: &[Option<StressState>],
+    ) -> Option<StressState> {
+        let of_cell = self.cells.region_of(around.cell);
+        let region = region.unwrap_or(of_cell);
         let mut standing = around.standing().map(|(particle, _)| particle);
         let first = standing.next()?;
         let rest: Vec<usize> = standing.collect();
         let on_all = |cell: u32| rest.iter().all(|&other| self.incidence.of(other).contains(&cell));
         let mut shared = self.incidence.of(first).iter().filter(|&&cell| on_all(cell));
-        let is_between = shared.any(|&cell| self.cells.region_of(cell as usize) != region);
+        let is_between = shared.any(|&cell| self.cells.region_of(cell as usize) != of_cell);
+        // Cells have chords for arcs: a place may be on the other side of one.
+        let is_between = is_known_to_be_between || is_between && region == of_cell;
         let of = |particle: usize| {
             let is_within = is_between || self.regions_around(particle).all(|other| other == region);
             let found = if is_within { of_particles[particle] } else { self.within(particle, region) }?;

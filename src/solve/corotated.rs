@@ -514,8 +514,10 @@ impl Newton<'_> {
             _ => true,
         };
         let is_far = rule.any(!turns.iter().zip(&locals).all(near));
-        // An iteration sees of a system what its right-hand side has in it; a factorisation sees all.
-        let is_seen = self.last_step <= NEAR && (is_rounding || rule.step.solver == DIRECT);
+        // An iteration sees of a system what its right-hand side has in it, which is all where that is rounding; a factorisation sees
+        // all, and a sweep nothing.
+        let sees = rule.question.solver == rule.step.solver;
+        let is_seen = sees && self.last_step <= NEAR && (is_rounding || rule.step.solver == DIRECT);
         let is_taken = is_settled && !is_far && (is_seen || self.is_stable(&locals)?);
         Ok(is_taken.then_some(u))
     }

@@ -280,6 +280,18 @@ fn the_stress_of_a_report_reaches_what_the_program_prints() {
     let shown = number(&seen["scale"], "end");
     assert!(largest > 3.3 && (shown - largest).abs() < 1e-9 * largest, "{shown} of {largest}");
     assert_eq!(seen["seams"], json!([0]));
+    // Displacements of some 1e-10, whose last digit is that of the power; and far from the origin.
+    let stiff = ["--set", "material.young=1e11", "--set", "material.thickness=2.0"];
+    let report = Report::of(&[&["run", "plate-hole"][..], &stiff].concat());
+    let find: Vec<_> = ["60", "400", "700", "1200"].iter().map(|id| json!([id, 100])).collect();
+    let seen = report.tour(&json!({ "find": find }));
+    assert_sound(&seen);
+    let small = |shown: &Value| (1e-11..1e-9).contains(&number(shown, "ux").abs());
+    assert!(seen["numbers"].as_array().is_some_and(|all| all.len() == 4 && all.iter().any(small)), "{seen}");
+    // In even parts of the load stress is as many parts of that at the end.
+    let half = report.tour(&json!({ "find": [["60", 50], ["60", 100]] }));
+    let [half, whole] = [0, 1].map(|k| number(&half["numbers"][k], "von_mises"));
+    assert!((half / whole - 0.5).abs() < 1e-12, "{half} of {whole}");
 }
 
 #[test]

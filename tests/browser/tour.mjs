@@ -60,10 +60,17 @@ async function small(page) {
   });
 }
 
-// The numbers shown in an element, as written to the last digit.
+// The numbers shown in an element, as written to the last digit; what is read there is the same to five digits.
 const numbersIn = (page, id) =>
   page.evaluate((where) => {
     const rows = [...document.querySelectorAll(`#${where} data`)];
+    for (const { dataset, value, textContent } of rows) {
+      const read = Number(textContent.replaceAll("−", "-"));
+      const off = Math.abs(read - Number(value));
+      if (dataset.key !== "role" && value !== "" && !(off <= 1e-5 * Math.abs(Number(value)))) {
+        throw new Error(`${dataset.key} is read as ${textContent} and is ${value}`);
+      }
+    }
     return Object.fromEntries(rows.map((row) => [row.dataset.key, row.value]));
   }, id);
 

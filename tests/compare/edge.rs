@@ -307,6 +307,53 @@ fn stress_is_that_of_one_side_where_materials_meet() {
     }
 }
 
+/// A disc of two materials, pulled all round by 1 (G. Lame).
+const CORE: &str = r#"
+title = "A disc with a stiff core, pulled all round"
+lattice = { kind = "square", spacing = 1.0 }
+material = { kind = "isotropic", young = 100.0, poisson = 0.3 }
+rule = { mean = { kind = "material" } }
+equilibrium = {}
+
+[body]
+shape = { kind = "disc", centre = [0.0, 0.0], radius = 10.0 }
+inclusions = [{ shape = { kind = "disc", centre = [0.0, 0.0], radius = 4.0 }, material = { kind = "isotropic", young = 2000.0, poisson = 0.3 } }]
+
+[[roles]]
+region = { kind = "disc", centre = [0.0, 0.0], radius = 0.1 }
+role = "clamped"
+
+[[roles]]
+region = { kind = "disc", centre = [1.0, 0.0], radius = 0.1 }
+role = "clamped"
+axis = "y"
+
+[[loads]]
+kind = "pressure"
+region = { kind = "boundary" }
+pressure = -1.0
+"#;
+
+#[test]
+fn a_place_is_on_its_own_side_of_a_curved_interface_and_on_it_on_that_of_the_larger_stress() {
+    // Just within the circle, but beyond the chord of the cells; on it, four times alike, and between particles; well without.
+    let within = [[-3.69748, -1.49524], [0.0, 3.999]];
+    let on = [[4.0, 0.0], [-4.0, 0.0], [0.0, 4.0], [0.0, -4.0], [2.4, 3.2], [-3.2, 2.4]];
+    let places: Vec<String> = within.iter().chain(&on).map(|p| format!("{p:?}")).collect();
+    let places = format!("record.places=[{}]", places.join(","));
+    let found = compare_scene(&scene(CORE, &[&places])).unwrap_or_else(|error| panic!("{error}"));
+    // Pressure q on the interface: both displacements are equal there. Inside stress is q all round.
+    let (a, b, stiff, soft, nu) = (4.0_f64, 10.0_f64, 2000.0, 100.0, 0.3);
+    let (inner, outer) = (a * a, b * b);
+    let of_pull = 2.0 * outer / (outer - inner) / soft;
+    let of_core = (1.0 - nu) / stiff + ((1.0 - nu) * inner + (1.0 + nu) * outer) / (outer - inner) / soft;
+    let q = of_pull / of_core;
+    for at in &found.places {
+        let (rule, truth) = (at.rule.von_mises / q - 1.0, at.truth.von_mises / q - 1.0);
+        assert!(truth.abs() < 2e-3 && rule.abs() < 0.02, "{:?}: {rule} {truth}", at.rule.place);
+    }
+}
+
 #[test]
 fn between_tension_and_compression_there_is_no_von_mises_stress() {
     // No row of particles in the middle.

@@ -241,7 +241,7 @@ fn check_ids(scene: &Scene, key: &str, region: &SceneRegion, body: &Body) -> Res
             None => no_particle(id, body),
         };
         let help = match body.numbering {
-            Some(_) => "ids are those of the body's file, or the numbers of its rows",
+            Some(_) => "ids are those of the body's file, or, where that has none, the numbers of its rows",
             None => {
                 "particles count from 1, column by column from the bottom left, the frame's included; in a report a \
                  particle that is pointed at shows its number"
@@ -259,7 +259,10 @@ pub(in crate::continuum) fn no_particle(id: usize, body: &Body) -> String {
         Some(part) => (1, part.total),
         None => ids.fold((usize::MAX, 0), |(low, high), id| (low.min(id), high.max(id))),
     };
-    format!("there is no particle {id}: ids run from {low} to {high}")
+    match (low..=high).contains(&id) {
+        true => format!("there is no particle {id} between the ids {low} and {high}"),
+        false => format!("there is no particle {id}: ids run from {low} to {high}"),
+    }
 }
 
 /// Refuses a hole or a piece that the outline does not have, and angles where there are no arcs.

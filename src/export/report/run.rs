@@ -98,6 +98,10 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
     note += &format!(
         " Displacements are kept to {bits} bits of each frame's range; PE1, strain and stress are computed from them."
     );
+    if animation.stress.is_some() && !(is_solved && animation.linear) {
+        note += " Stress before the last frame is that of a mean gradient over each particle's neighbours: at edges and corners it is not \
+                 that of the cells, which the last frame, final.csv and films have.";
+    }
     note += if animation.exact.is_empty() {
         " The body is too large for its last numbers to be kept exactly: final.csv has them."
     } else {
@@ -111,14 +115,21 @@ fn facts(scene: &Scene, outcome: &Outcome, summary: &Summary) -> Vec<(String, St
     let mut facts = Vec::new();
     let mut fact = |name: &str, value: String| facts.push((name.to_owned(), value));
     let roles = [
-        (counts.followers, "followers"),
-        (counts.leaders, "leaders"),
+        (counts.followers, "follower"),
+        (counts.leaders, "leader"),
         (counts.clamped, "clamped"),
         (counts.frame, "frame"),
-        (counts.ghosts, "ghosts"),
+        (counts.ghosts, "ghost"),
     ];
-    let roles: Vec<String> =
-        roles.iter().filter(|(count, _)| *count > 0).map(|(count, name)| format!("{count} {name}")).collect();
+    let roles: Vec<String> = roles
+        .iter()
+        .filter(|(count, _)| *count > 0)
+        .map(
+            |&(count, name)| {
+                if name == "frame" { format!("{count} in the frame") } else { counted(count, name) }
+            },
+        )
+        .collect();
     fact("Particles", format!("{} ({})", counts.particles, roles.join(", ")));
     fact("Pairs of neighbours", counts.neighbour_pairs.to_string());
     if let Some(equilibrium) = &summary.equilibrium {

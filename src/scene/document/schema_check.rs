@@ -326,7 +326,10 @@ fn conversion_help(node: &Node, rule: &Rule<'_>) -> Option<String> {
             let number = text.parse::<f64>().ok().filter(|number| number.is_finite())?;
             fits(Content::Float(number)).then(|| format!("write {number:?}, without quotes"))
         }
-        Content::Float(number) if number.fract() == 0.0 && fits(Content::Integer(0)) => {
+        // Beyond that it would be refused again.
+        Content::Float(number)
+            if number.fract() == 0.0 && number.abs() < 1e18 && fits(Content::Integer(0)) =>
+        {
             Some(format!("write {number}, without a decimal point"))
         }
         Content::Integer(_) | Content::Float(_) | Content::Boolean(_) => {

@@ -91,6 +91,7 @@ pub enum RawRegion {
         /// Numbers of its edges and arcs, counted from 1; all of them unless given. Those of a polygon begin at its
         /// vertices, those of a rectangle are bottom, right, top and left [1].
         #[serde(default)]
+        #[schemars(inner(range(min = 1)))]
         pieces: Vec<usize>,
         /// Of arcs alone: between these directions from their centres, counter-clockwise [degree].
         #[serde(default)]

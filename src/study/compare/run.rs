@@ -295,5 +295,11 @@ pub(super) fn refused(scene: &Scene, error: &FemError) -> SceneError {
         FemError::Mechanism { .. } | FemError::Singular { .. } => "the finite elements have no equilibrium",
         _ => "the truth cannot be computed",
     };
-    scene.refuse(key, format!("{what}: {error}"), help)
+    let why = match error {
+        FemError::InvertedCell { .. } => {
+            "two of its lines touch in a cusp, or nearly, where no finite element fits".into()
+        }
+        error => error.to_string(),
+    };
+    scene.refuse(key, format!("{what}: {why}"), help)
 }

@@ -12,6 +12,7 @@ use crate::continuum::plan::Plan;
 use crate::continuum::run::Outcome as RunOutcome;
 use crate::flock::role::Role;
 use crate::flock::vectors::{Vectors, distance};
+use crate::scene::text::counted;
 use crate::scene::{Scene, SceneError};
 use crate::solve::stopwatch::Stopwatch;
 use crate::study::compare::reference::{Effort, Reference};
@@ -269,7 +270,8 @@ const ASKED: [f64; 4] = [0.3, 0.1, 0.01, 0.001];
 
 impl fmt::Display for Study {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}: {} settings, {} runs each", self.title, self.points.len(), self.repeats)?;
+        let runs = counted(self.repeats, "run");
+        writeln!(f, "{}: {} settings, {runs} each", self.title, self.points.len())?;
         write!(f, "truth: {} nodes, {:.3} s", self.truth_nodes, self.truth_seconds)?;
         match self.truth_stated_error {
             Some(error) => writeln!(f, ", states an error of {:.1e} % of its own", 100.0 * error)?,

@@ -1,5 +1,10 @@
 //! The reasons for rejecting a pose, and how often each occurred.
 
+/// To millimetres, or, of what may be anything, in few digits.
+fn metres(distance: &f64) -> String {
+    if *distance < 1e9 { format!("{distance:.3}") } else { format!("{distance:.3e}") }
+}
+
 /// The reason for rejecting a pose. It does not name the member, which the receiver knows.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Rejection {
@@ -14,8 +19,9 @@ pub enum Rejection {
     WrongFrame,
     /// It is farther from the formation's middle than any pose may be.
     #[error(
-        "a pose lies {distance:.3} m from the centre, at most {range:.3} m is allowed: check its frame and \
-         units, or raise the range"
+        "a pose lies {} m from the centre, at most {range:.3} m is allowed: check its frame and \
+         units, or raise the range",
+        metres(.distance)
     )]
     OutOfRange {
         /// Its distance from there \[m\].
@@ -53,8 +59,9 @@ pub enum Rejection {
     },
     /// It implies a speed that no robot has.
     #[error(
-        "a pose lies {distance:.3} m from the last one, at most {allowed:.3} m is allowed in the time between: \
-         {seen} of the {recover} in a row that would make it believed"
+        "a pose lies {} m from the last one, at most {allowed:.3} m is allowed in the time between: \
+         {seen} of the {recover} in a row that would make it believed",
+        metres(.distance)
     )]
     Jump {
         /// Distance from the last pose believed \[m\].

@@ -238,6 +238,13 @@ impl Track {
     ) -> Robot {
         let Some(stamp) = self.stamp else { return robot };
         let model = Model::DoubleIntegrator(*dynamics);
+        // Before it is sent anywhere from here, another program may drive it, and goes on with that: a robot that is taken to stand would be
+        // taken to speed up by every pose.
+        let unsent = self.sent.front().map_or(until, |&(from, _)| from.min(until)) - stamp;
+        if unsent > 0.0 {
+            leaves(&robot);
+            robot.position = [0, 1].map(|k| robot.position[k] + unsent * robot.velocity[k]);
+        }
         let mut step = |robot: &mut Robot, target: [f64; 2], time: f64| {
             if time > 0.0 {
                 leaves(robot);
@@ -392,6 +399,37 @@ mod tests {
                 robot.step(&Model::DoubleIntegrator(DYNAMICS), target, PERIOD);
             }
             assert!(late < 20, "{size} m: {late} of 400");
+        }
+    }
+
+    #[test]
+    fn a_robot_that_another_program_drives_and_stops_is_known_to_stand() {
+        for late in [0, 3] {
+            let (mut robot, mut track) = (Robot::at([0.0; 2], 0.0), Track::default());
+            let mut poses = Vec::new();
+            for k in 0..120 {
+                let now = k as f64 * PERIOD;
+                poses.push(Pose { position: robot.position, yaw: 0.0, stamp: now, frame_is_right: true });
+                if k >= late {
+                    track.correct(&poses[k - late], &DYNAMICS, PERIOD, 0.0);
+                }
+                // A loop that is not active sends it nowhere.
+                track.send(now, None);
+                let found = track.at(now, &DYNAMICS, PERIOD, &mut Vec::new());
+                let off = distance(found.velocity, robot.velocity);
+                assert!(
+                    off <= (late + 1) as f64 * DYNAMICS.acceleration * PERIOD + 1e-12,
+                    "{late}, {k}: {found:?}"
+                );
+                robot.step(
+                    &Model::DoubleIntegrator(DYNAMICS),
+                    if k < 50 { [9.0, 0.0] } else { robot.position },
+                    PERIOD,
+                );
+            }
+            let found = track.at(120.0 * PERIOD, &DYNAMICS, PERIOD, &mut Vec::new());
+            assert!(distance(found.velocity, [0.0; 2]) < 1e-9, "{late}: {found:?}");
+            assert!(distance(found.position, robot.position) < 1e-9, "{late}: {found:?}");
         }
     }
 

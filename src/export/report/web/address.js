@@ -28,7 +28,7 @@ function present() {
     compare: state.compare,
     edge: element("edge").value,
     // In lengths, which are the same in every window: middle and width.
-    view: state.isFitted ? "" : [camera.x, camera.y, view.width / camera.scale].map((value) => value.toPrecision(6)).join(","),
+    view: state.isFitted ? "" : [camera.x, camera.y, view.width / camera.scale].map((value) => Number(value.toPrecision(15))).join(","),
   };
 }
 

@@ -104,6 +104,11 @@ export class Body {
     });
   }
 
+  // Whether frames are even parts of one load, to which all is proportional.
+  get isEvenLoad() {
+    return this.animation.linear && this.animation.clock.quantity === "load";
+  }
+
   get last() {
     return this.animation.times.length - 1;
   }
@@ -176,7 +181,10 @@ export class Body {
     else if (key === "strain") this.eachStrain((i, xx, yy, xy) => {
       out[i] = Math.abs(xx + yy) / 2 + Math.hypot((xx - yy) / 2, xy);
     }, out);
-    else if (key === "von_mises" && this.at === this.last && this.exact.has(key)) out.set(this.exact.get(key));
+    else if (key === "von_mises" && this.exact.has(key) && (this.at === this.last || this.isEvenLoad)) {
+      const part = this.at === this.last ? 1 : this.step / this.animation.times[this.last];
+      this.exact.get(key).forEach((value, i) => (out[i] = part * value));
+    }
     else if (key === "von_mises") this.vonMises(out);
     else out.fill(NaN);
   }

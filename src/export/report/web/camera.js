@@ -4,14 +4,12 @@ import { draw } from "./page.js";
 import { sampled } from "./scale.js";
 import { bodies, element, shown, state } from "./shown.js";
 
-// Places that are looked at for the window.
-const MOST_PLACES = 400000;
 // The view follows once what moves is nearer to its edge than this part of it.
 const NEAR_EDGE = 0.03;
 
 export function fit() {
   const seen = shown.views.filter((one) => one.isSeen);
-  const boxes = seen.map((view) => view.bounds(framesToFit(view.body), state.factor, state.turned));
+  const boxes = seen.map((view) => view.bounds(sampled(view.body), state.factor, state.turned));
   const low = [0, 1].map((k) => Math.min(...boxes.map((box) => box.low[k])));
   const high = [0, 1].map((k) => Math.max(...boxes.map((box) => box.high[k])));
   const view = shown.views[0];
@@ -25,13 +23,6 @@ export function fit() {
   const scale = 0.9 * Math.min(...scales.filter((s) => Number.isFinite(s) && s > 0));
   state.camera = { x: (low[0] + high[0]) / 2, y: (low[1] + high[1]) / 2, scale: Number.isFinite(scale) ? scale : 1 };
   state.isFitted = true;
-}
-
-// All frames of a swarm, whose robots turn back between two of a sample; a sample of those that would take long.
-function framesToFit(body) {
-  const { ready, last } = shown.player;
-  const isShort = body.animation.radii.length > 0 && ready * body.count <= MOST_PLACES;
-  return isShort ? Array.from({ length: ready }, (_, frame) => frame) : sampled(ready, last);
 }
 
 // Keeps what moves on the page, unless the reader has moved the view or holds something in it.
@@ -71,7 +62,7 @@ export function wantedFactor() {
   let largest = 0;
   const [low, high] = [[Infinity, Infinity], [-Infinity, -Infinity]];
   for (const body of bodies) {
-    for (const frame of sampled(shown.player.ready, shown.player.last)) {
+    for (const frame of sampled(body)) {
       body.go(frame);
       for (const u of body.field("displacement")) if (u > largest) largest = u;
     }

@@ -46,9 +46,15 @@ export function words(value, digits = 6) {
   if (!Number.isFinite(value)) return "–";
   if (value === 0) return "0";
   const size = Math.abs(value);
-  let text = size >= 1e-4 && size < 1e7 ? String(Number(value.toPrecision(digits))) : value.toExponential(digits - 1);
-  text = text.replace(/\.?0+(e|$)/, (all, end) => (text.includes(".") ? end : all)).replace("e+", "e");
-  return text.replaceAll("-", "−");
+  if (size >= 1e-4 && size < 1e7) return String(Number(value.toPrecision(digits))).replace("-", "−");
+  const [mantissa, exponent] = value.toExponential(digits - 1).split("e");
+  return `${Number(mantissa)}e${Number(exponent)}`.replaceAll("-", "−");
+}
+
+// A coordinate, to a part of a length: far from the origin that takes more digits.
+export function placeWords(value, part) {
+  const digits = Math.ceil(Math.log10(Math.abs(value) / part)) + 1;
+  return words(value, Number.isFinite(digits) ? Math.min(Math.max(digits, 1), 17) : 6);
 }
 
 // Round values from low to high, about `most` of them.

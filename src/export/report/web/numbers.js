@@ -1,6 +1,6 @@
 // The numbers of a particle: beside the pointer, or kept below the animation.
 
-import { words } from "./colour.js";
+import { placeWords, words } from "./colour.js";
 import { draw } from "./page.js";
 import { bodies, element, shown } from "./shown.js";
 import { isUnit } from "./view.js";
@@ -21,7 +21,10 @@ export function numbersOf(body, particle) {
   const role = body.animation.role_names[body.roles()[particle]];
   row(["role", "role"], role, role);
   for (const { key, label, unit, value } of body.numbers(particle)) {
-    row([key, isUnit(unit) ? `${label} [${unit}]` : label], words(value), Number.isFinite(value) ? String(value) : "");
+    const isPlace = key === "x" || key === "y";
+    // To a thousandth of what lies between neighbours, and to six digits at least.
+    const text = isPlace ? placeWords(value, Math.min(1e-3 * body.animation.spacing, 1e-5 * Math.abs(value))) : words(value);
+    row([key, isUnit(unit) ? `${label} [${unit}]` : label], text, Number.isFinite(value) ? String(value) : "");
   }
   return list;
 }

@@ -39,8 +39,9 @@ export function drawNow() {
 function drawClock() {
   const { quantity, unit } = bodies[0].animation.clock;
   const [now, end] = [shown.player.times[shown.player.frame], shown.player.times.at(-1)];
-  const whole = shown.player.isLive ? "" : ` of ${words(end)}`;
-  const text = `${quantity} ${words(now)}${whole}${unit ? ` ${unit}` : ""}`;
+  const time = (value) => (Number.isInteger(value) ? String(value) : words(value));
+  const whole = shown.player.isLive ? "" : ` of ${time(end)}`;
+  const text = `${quantity} ${time(now)}${whole}${unit ? ` ${unit}` : ""}`;
   element("now").textContent = text;
   element("time").value = String(shown.player.frame);
   element("time").setAttribute("aria-valuetext", text);

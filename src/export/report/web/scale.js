@@ -5,7 +5,8 @@ import { bodies, element, shown, state } from "./shown.js";
 import { markOf } from "./marks.js";
 import { isUnit } from "./view.js";
 
-// Frames looked at for the window and for the scale of a quantity.
+// Values of a quantity that are looked at for the window and for its scale in all frames; of more, these frames are.
+const MOST_VALUES = 400000;
 const LOOKED_AT = 24;
 // The scale ends at this part of all values if the largest is so many times above it; stress has peaks that matter.
 const MOST_OF_ALL = 0.995;
@@ -43,8 +44,12 @@ function valuesOf(body, key) {
   return body.field(key).map((value, i) => value - theirs[i]);
 }
 
-export function sampled(ready, last) {
-  const count = Math.min(LOOKED_AT, ready);
+// The frames to look at.
+export function sampled({ count: particles }) {
+  const { ready, last } = shown.player;
+  // While more are still to come, few.
+  const isShort = ready > last && ready * particles <= MOST_VALUES;
+  const count = isShort ? ready : Math.min(LOOKED_AT, ready);
   const frames = new Set(Array.from({ length: count }, (_, k) => Math.round((k * (ready - 1)) / Math.max(count - 1, 1))));
   if (ready > last) frames.add(last);
   return [...frames];
@@ -59,7 +64,7 @@ export function rangeOf(key) {
   let peak = -Infinity;
   for (const body of isDifference() ? bodies.slice(0, 1) : bodies) {
     const at = body.at;
-    for (const frame of sampled(shown.player.ready, shown.player.last)) {
+    for (const frame of sampled(body)) {
       body.go(frame);
       const field = valuesOf(body, key);
       const every = Math.max(1, Math.floor(field.length / 4000));
@@ -92,8 +97,11 @@ export function shade(body, out) {
     return;
   }
   // The scale first: it looks at other frames.
-  const { low, high } = rangeOf(state.quantity);
+  const range = rangeOf(state.quantity);
+  const { low, high } = range;
   const field = valuesOf(body, state.quantity);
+  // A frame that was not looked at may have more.
+  for (const value of field) if (Math.abs(value) > range.largest && (isDifference() || value > 0)) range.largest = Math.abs(value);
   if (isLog()) {
     const top = Math.log10(high);
     for (let i = 0; i < out.length; i++) {

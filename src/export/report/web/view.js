@@ -3,7 +3,7 @@
 import { Painter } from "./painter.js";
 import { PlainPainter } from "./painter2d.js";
 import { marksOf } from "./marks.js";
-import { themeColour, themeText, ticks, words } from "./colour.js";
+import { placeWords, themeColour, themeText, ticks, words } from "./colour.js";
 import { shown } from "./shown.js";
 
 // Ways of more particles would cover each other.
@@ -247,10 +247,11 @@ export class View {
     const named = (name) => (isUnit(unit) ? `${name} [${unit}]` : name);
     for (const x of across) {
       const from = this.pixel([x, 0])[0] + 3;
-      if (from > 53 && from + pen.measureText(words(x)).width < this.width - 2) pen.fillText(words(x), from, this.height - 5);
+      const text = placeWords(x, step);
+      if (from > 53 && from + pen.measureText(text).width < this.width - 2) pen.fillText(text, from, this.height - 5);
     }
     const between = up.filter((y) => this.pixel([0, y])[1] > 34 && this.pixel([0, y])[1] < this.height - 16);
-    between.forEach((y) => pen.fillText(words(this.show.turned ? -y : y), 5, this.pixel([0, y])[1] - 3));
+    between.forEach((y) => pen.fillText(placeWords(this.show.turned ? -y : y, step), 5, this.pixel([0, y])[1] - 3));
     pen.fillText(named(h), this.width - pen.measureText(named(h)).width - 6, 14);
     pen.fillText(named(v), 5, 14);
     // A saved picture says it too.
