@@ -16,7 +16,6 @@ pub enum RawMaterial {
         #[schemars(extend("exclusiveMinimum" = 0))]
         young: f64,
         /// Poisson's ratio: between -1 and 1 in plane stress, between -1 and 1/2 in plane strain [1].
-        #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 1))]
         poisson: f64,
         /// The assumption across the thickness; plane stress unless given.
         #[serde(default)]
