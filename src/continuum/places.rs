@@ -87,6 +87,9 @@ pub fn around(
 
 /// Displacement and stress at each place of `record.places`, under the stresses at present; on all ranks that share the body.
 pub fn at_places(scene: &Scene, engine: &Engine, stresses: &Stresses) -> Vec<AtPlace> {
+    if scene.record.places.is_empty() {
+        return Vec::new();
+    }
     let team = engine.parted();
     let around = around(scene, (engine.body(), engine.cells()), team).unwrap_or_default();
     let material = engine.cells().zip(engine.elastic());

@@ -39,7 +39,7 @@ impl<'m> Locator<'m> {
             let within =
                 kind.shape(kind.clamped(place)).interpolate(&self.mesh.positions(cell)[..kind.nodes()]);
             let apart = distance(p, within);
-            (0.0 < apart && apart <= reach).then_some((apart, cell, place))
+            (reach > 0.0 && apart <= reach).then_some((apart, cell, place))
         });
         let mut near: Vec<_> = near.collect();
         near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
