@@ -260,7 +260,7 @@ pub(in crate::continuum) fn no_particle(id: usize, body: &Body) -> String {
         None => ids.fold((usize::MAX, 0), |(low, high), id| (low.min(id), high.max(id))),
     };
     match (low..=high).contains(&id) {
-        true => format!("there is no particle {id} between the ids {low} and {high}"),
+        true => format!("there is no particle {id} among the ids from {low} to {high}"),
         false => format!("there is no particle {id}: ids run from {low} to {high}"),
     }
 }
