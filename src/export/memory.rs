@@ -52,7 +52,7 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
         if outputs.report { packed(plan, is_solved_at_once) } else { Packed::default() };
     let stepping = match is_solved_at_once {
         true => solving(scene, plan),
-        false => values + frames[0] + solving(scene, plan),
+        false => values + frames[0] + taken_back(scene, plan) + solving(scene, plan),
     };
     let packing = last + values.max(packing) + frames[1];
     let tables = last + text + measured(plan);
@@ -65,6 +65,11 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
     };
     let most = [stepping, packing, tables, drawing].into_iter().max().unwrap_or(0);
     program + RUNNING + stepped(plan) + snapshots + most
+}
+
+/// Bytes of the places to which a body is taken back whose step diverges, or whose steps at once came to rest on the way.
+fn taken_back(scene: &Scene, plan: &Plan) -> usize {
+    if scene.is_solved_at_once() { 0 } else { 16 * plan.count() }
 }
 
 /// Bytes that one of so many ranks with a part of a body takes at its largest, by a program whose own code takes so many: there
@@ -80,7 +85,8 @@ pub fn of_part(scene: &Scene, plan: &Plan, (ranks, report): (usize, bool), progr
     let halo = plan.setup.body.part.as_ref().map_or(0, |part| part.exact.len() - part.owned.len());
     let Packed { values, frames, packing, .. } =
         if report { packed(plan, scene.is_solved_at_once()) } else { Packed::default() };
-    let most = measured(plan).max(ON_THE_WAY * halo).max(solving(scene, plan));
+    let stepping = ON_THE_WAY * halo + taken_back(scene, plan);
+    let most = measured(plan).max(stepping).max(solving(scene, plan));
     let shown = values.max(packing) + frames[0];
     program + RUNNING + stepped(plan) + each + of_rank * ranks.min(ON_A_MACHINE) + most + shown
 }

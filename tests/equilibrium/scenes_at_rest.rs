@@ -267,11 +267,7 @@ fn what_cannot_carry_a_material_is_refused_with_the_reason() {
     for (more, words) in [
         ("neighbours={kind=\"first\"}", "4 neighbours cannot carry shear coupling"),
         ("material.poisson=1.0", "Poisson's ratio"),
-        ("material.young=-1.0", "must be greater than 0"),
-        (
-            "material={kind=\"orthotropic\",young=[-1.0,1.0],poisson_12=0.3,shear=1.0}",
-            "Young's modulus must be positive",
-        ),
+        ("material.young=-1.0", "Young's modulus must be positive"),
         ("material.thickness=0.0", "thickness"),
         ("frame=lagged", "needs no frame"),
         ("fracture={stretch=2.0}", "in cells, not in bonds"),

@@ -13,7 +13,6 @@ pub enum RawMaterial {
     /// The same in every direction.
     Isotropic {
         /// Young's modulus [force / length^2].
-        #[schemars(extend("exclusiveMinimum" = 0))]
         young: f64,
         /// Poisson's ratio: between -1 and 1 in plane stress, between -1 and 1/2 in plane strain [1].
         poisson: f64,
@@ -22,7 +21,6 @@ pub enum RawMaterial {
         plane: RawPlane,
         /// Thickness [length].
         #[serde(default = "super::defaults::one")]
-        #[schemars(extend("exclusiveMinimum" = 0))]
         thickness: f64,
     },
     /// Plane stress with fibres.
@@ -32,14 +30,12 @@ pub enum RawMaterial {
         /// Contraction across the fibres under tension along them [1].
         poisson_12: f64,
         /// Shear modulus [force / length^2].
-        #[schemars(extend("exclusiveMinimum" = 0))]
         shear: f64,
         /// Direction of the fibres, from x [degree].
         #[serde(default)]
         angle: f64,
         /// Thickness [length].
         #[serde(default = "super::defaults::one")]
-        #[schemars(extend("exclusiveMinimum" = 0))]
         thickness: f64,
     },
 }
