@@ -118,7 +118,9 @@ impl Solution {
     pub(super) fn parted(&self) -> (Solution, Vec<u32>) {
         let (mesh, at) = self.mesh.parted(|cell| self.inclusions.kind(cell, &self.material));
         let of = |values: &[f64]| at.iter().map(|&node| values[node as usize]).collect();
-        (Solution { mesh, ux: of(&self.ux), uy: of(&self.uy), ..self.clone() }, at)
+        let Self { material, strain, inclusions, .. } = self;
+        let (ux, uy, inclusions) = (of(&self.ux), of(&self.uy), inclusions.clone());
+        (Solution { mesh, material: *material, strain: *strain, inclusions, ux, uy }, at)
     }
 
     /// Stress known at the nodes, shape \[nodes\], at each point (x, y) \[m\]; points no further outside than `reach` \[m\]

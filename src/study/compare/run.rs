@@ -208,7 +208,19 @@ fn is_orthogonal(scene: &Scene, engine: &Engine, layout: &Layout) -> bool {
 /// # Errors
 /// As [`Plan::new`].
 pub(crate) fn plan_led_by(scene: &Scene, truth: &Reference) -> Result<Plan, SceneError> {
-    Plan::of_layout(scene, Layout::new(scene)?, Some(&led_by(truth)))
+    plan_of_layout_led_by(scene, Layout::new(scene)?, truth)
+}
+
+/// The same of a body that is laid out.
+///
+/// # Errors
+/// As [`Plan::of_layout`].
+pub(crate) fn plan_of_layout_led_by(
+    scene: &Scene,
+    layout: Layout,
+    truth: &Reference,
+) -> Result<Plan, SceneError> {
+    Plan::of_layout(scene, layout, Some(&led_by(truth)))
 }
 
 /// A leader that the truth does not know has no place to go.

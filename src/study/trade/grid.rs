@@ -110,7 +110,7 @@ pub fn divides(scene: &Scene, part: f64) -> bool {
     }
 }
 
-/// Overrides that give a scene this rule at this part of its spacing, which [divides](divides) it.
+/// Overrides that give a scene this rule at this part of its spacing, which [`divides`] it.
 pub fn body_overrides(scene: &Scene, rule: RuleChoice, part: f64) -> Vec<String> {
     let mut overrides = Vec::new();
     let mean = match (rule, &scene.raw.rule.mean) {

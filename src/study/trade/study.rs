@@ -16,7 +16,9 @@ use crate::scene::text::counted;
 use crate::scene::{Scene, SceneError};
 use crate::solve::stopwatch::Stopwatch;
 use crate::study::compare::reference::{Effort, Reference};
-use crate::study::compare::run::{SceneReference, plan_led_by, reference_of, require_comparable};
+use crate::study::compare::run::{
+    SceneReference, plan_led_by, plan_of_layout_led_by, reference_of, require_comparable,
+};
 
 /// The outcome of a setting.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -152,9 +154,10 @@ pub fn run(load: Load<'_>, grid: &Grid, progress: &mut dyn FnMut(&Setting)) -> R
 
 /// The plan of a body that is held where the truth is.
 fn plan_alike(scene: &Scene, held: &[Extent], truth: &Reference) -> Result<Plan, SceneError> {
-    let own = extents_of_roles(scene, &Layout::new(scene)?)?;
+    let layout = Layout::new(scene)?;
+    let own = extents_of_roles(scene, &layout)?;
     match held_elsewhere(held, &own, scene.lattice.spacing()) {
-        None => plan_led_by(scene, truth),
+        None => plan_of_layout_led_by(scene, layout, truth),
         Some((key, elsewhere)) => {
             let message = format!("another spacing makes another body, {elsewhere}");
             Err(scene.refuse(&key, message, "pick pieces of the outline"))
