@@ -112,9 +112,22 @@ impl Stresses {
     /// At the engine's present places; of a scene without a material nothing is laid out to find that it has none.
     pub fn at_present(engine: &Engine) -> Option<Self> {
         engine.cells()?;
-        let here = |index: u32| Some(engine.body().exact_particle(index as usize)? as u32);
-        let pairs = engine.breaks().iter().filter_map(|one| Some([here(one.pair[0])?, here(one.pair[1])?]));
-        Self::of(engine, engine.step(), &engine.displacements(), &pairs.collect::<Vec<_>>())
+        Self::under(engine, &engine.displacements())
+    }
+
+    /// At present, under other displacements \[length\].
+    pub fn under(engine: &Engine, displacement: &Vectors) -> Option<Self> {
+        Self::of(engine, engine.step(), displacement, &parted(engine))
+    }
+
+    /// The von Mises stress around each particle at present \[force / length^2\], shape \[count\]: that of
+    /// [`Stresses::particles`] where none is recovered, for a fraction of the time. NaN where there is none, empty without a
+    /// material.
+    pub fn von_mises_of_cells(engine: &Engine) -> Vec<f64> {
+        let (Some(cells), Some(elastic)) = (engine.cells(), engine.elastic()) else { return Vec::new() };
+        let displacement = engine.displacements();
+        let of_cells = Self::in_cells(engine, engine.step(), &displacement, &parted(engine));
+        AroundParticles::new(cells, elastic, &of_cells, displacement.len()).von_mises()
     }
 
     /// Of the whole body, if each part knows its own.
@@ -178,6 +191,12 @@ fn highest_of_parts(engine: &Engine, own: Option<Peak>) -> Option<Peak> {
             next.von_mises > best.von_mises || (next.von_mises == best.von_mises && is_first(&next, &best));
         if is_higher { next } else { best }
     })
+}
+
+/// Pairs of particles of this part that are parted at present.
+fn parted(engine: &Engine) -> Vec<[u32; 2]> {
+    let here = |index: u32| Some(engine.body().exact_particle(index as usize)? as u32);
+    engine.breaks().iter().filter_map(|one| Some([here(one.pair[0])?, here(one.pair[1])?])).collect()
 }
 
 /// The stress of each cell, NaN in those that are torn.
@@ -270,7 +289,14 @@ impl Mechanics {
     fn missed_work(&self, engine: &Engine) -> Option<String> {
         let done = self.work_done.map(|work| work.loads + work.supports)?;
         let is_loaded = self.largest_strain > UNSTRAINED;
-        let of = if is_loaded { self.strain_energy } else { engine.path()?.most() };
+        let path = engine.path()?;
+        // One that was only carried about has borne nothing but rounding.
+        let unstrained =
+            UNSTRAINED * engine.elastic()?.stiffness().diagonal().min() * engine.body().lattice.spacing();
+        if !is_loaded && path.largest_force() <= unstrained {
+            return None;
+        }
+        let of = if is_loaded { self.strain_energy } else { path.most() };
         let missed = (done - self.strain_energy).abs() / of;
         (missed > MISSED_WORK && missed.is_finite()).then(|| {
             let missed = percent(missed);

@@ -25,6 +25,7 @@ pub struct Work {
 pub struct Path {
     done: Work,
     most: f64,
+    largest_force: f64,
     last: Option<Acting>,
 }
 
@@ -45,6 +46,11 @@ impl Path {
     /// The largest size of the sum of both at any equilibrium so far \[force length\].
     pub fn most(&self) -> f64 {
         self.most
+    }
+
+    /// The largest force of a load or a support on a particle at any equilibrium so far \[force\].
+    pub fn largest_force(&self) -> f64 {
+        self.largest_force
     }
 
     /// Adds the way to where the engine's body is at rest now.
@@ -71,6 +77,10 @@ impl Path {
         self.done.loads += loads;
         self.done.supports += supports;
         self.most = self.most.max((self.done.loads + self.done.supports).abs());
+        let force = |i: usize| [&now.loads, &now.supports].map(|of| of.get(i).map(f64::abs)).concat();
+        let own = engine.body().owned().flat_map(force).fold(0.0, f64::max);
+        let [largest] = engine.largest_of_parts([own]);
+        self.largest_force = self.largest_force.max(largest);
         self.last = Some(now);
     }
 }

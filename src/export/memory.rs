@@ -49,7 +49,7 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
     let drawn_before = if draws { scene.record.figures.iter().filter(before).count() } else { 0 };
     let [snapshots, last] = [drawn_before, usize::from(draws)].map(|each| each * SNAPSHOT * plan.count());
     let Packed { values, frames, packing, text } =
-        if outputs.report { packed(plan, is_solved_at_once) } else { Packed::default() };
+        if outputs.report { packed(scene, plan) } else { Packed::default() };
     let stepping = match is_solved_at_once {
         true => solving(scene, plan),
         false => values + frames[0] + taken_back(scene, plan) + solving(scene, plan),
@@ -83,8 +83,7 @@ pub fn of_part(scene: &Scene, plan: &Plan, (ranks, report): (usize, bool), progr
     const ON_THE_WAY: usize = 2 * 2 * 16;
     let [each, of_rank] = MPI;
     let halo = plan.setup.body.part.as_ref().map_or(0, |part| part.exact.len() - part.owned.len());
-    let Packed { values, frames, packing, .. } =
-        if report { packed(plan, scene.is_solved_at_once()) } else { Packed::default() };
+    let Packed { values, frames, packing, .. } = if report { packed(scene, plan) } else { Packed::default() };
     let stepping = ON_THE_WAY * halo + taken_back(scene, plan);
     let most = measured(plan).max(stepping).max(solving(scene, plan));
     let shown = values.max(packing) + frames[0];

@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 use super::command::Command;
 use super::history::{History, Source};
 use super::session::{Broken, Frame, Refused, Session, Viewer};
+use crate::continuum::mechanics::Stresses;
 use crate::engine::{Before, Engine};
 use crate::export::report::RunRecorder;
 use crate::export::report::view::View;
@@ -193,6 +194,12 @@ impl Session for Body {
             (0..2).for_each(|axis| places[axis][i] = (now[axis] + by[axis] - then[axis]) as f32);
         }
         let of = |name: &str| -> Vec<f32> {
+            if name == "von_mises" {
+                return Stresses::von_mises_of_cells(engine)
+                    .into_iter()
+                    .map(|stress| stress as f32)
+                    .collect();
+            }
             let value = |i: usize| match name {
                 "pe2" => engine.pe2(i),
                 "pe1" => engine.pe1(i),
@@ -206,10 +213,13 @@ impl Session for Body {
     }
 
     fn channels(&self) -> Vec<&'static str> {
-        match self.history.now.engine.lasting_neighbours() {
-            Some(_) => vec!["pe2"],
-            None => vec!["pe2", "pe1", "strain"],
+        let engine = &self.history.now.engine;
+        let mut channels = vec!["pe2"];
+        if engine.lasting_neighbours().is_none() {
+            channels.extend(["pe1", "strain"]);
         }
+        channels.extend(engine.cells().map(|_| "von_mises"));
+        channels
     }
 
     fn roles(&self) -> Vec<u8> {

@@ -126,6 +126,12 @@ impl<'a> AroundParticles<'a> {
         (0..self.particles).into_par_iter().map(|particle| self.larger(particle)).collect()
     }
 
+    /// The von Mises stress of the same, NaN where there is none.
+    pub fn von_mises(&self) -> Vec<f64> {
+        let of = |particle| self.larger(particle).map_or(f64::NAN, |stress| stress.von_mises);
+        (0..self.particles).into_par_iter().map(of).collect()
+    }
+
     /// At a place, from what its particles have; at those where materials meet on the side of the region that it is in, or, where
     /// that is not known, of its cell. A place that is itself where they meet, as is known or as the cells have it, has the side of the larger
     /// von Mises stress, as its particles have.

@@ -296,6 +296,66 @@ fn the_stress_of_a_report_reaches_what_the_program_prints() {
 
 #[test]
 #[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
+fn stress_on_the_way_is_that_of_a_run_that_ends_there() {
+    let of_cells = ["--set", r#"body.shape={kind="grid",columns=13,rows=8}"#];
+    let steps = |n: usize| format!("stop.steps={n}");
+    let increments = |schedule: &str| format!("load_steps={{schedule={schedule}}}");
+    for (name, way, end, at, sets) in [
+        ("pulled", steps(40), steps(20), 20, vec!["lattice.kind=\"hexagonal\""]),
+        ("pulled", steps(40), steps(20), 20, vec!["lattice.kind=\"honeycomb\""]),
+        ("turned", steps(40), steps(20), 20, vec!["rule.mean.rotation=\"corotated\""]),
+        ("torn", steps(40), steps(30), 30, vec!["rule.mean={kind=\"barycentre\"}", "fracture.stretch=1.2"]),
+        ("elastica", increments("[0.2,0.5,1]"), increments("[0.2,0.5]"), 2, vec![]),
+        ("inclusion", increments("[0.2,0.5,1]"), increments("[0.2,0.5]"), 2, vec![]),
+    ] {
+        let folder = temporary();
+        let file = folder.path().join("scene.toml");
+        std::fs::write(&file, PULLED).expect("written");
+        let bundled = ["elastica", "inclusion"].contains(&name);
+        let scene = if bundled { name } else { file.to_str().expect("a path") };
+        let report = |until: &str| {
+            let mut arguments = vec!["run", scene, "--figures", "none", "--set", until];
+            if !bundled {
+                arguments.extend(of_cells);
+            }
+            arguments.extend(sets.iter().flat_map(|set| ["--set", set]));
+            Report::of(&arguments)
+        };
+        let seen = report(&way).tour(&json!({ "fields": [["von_mises", at]] }));
+        assert_sound(&seen);
+        let shown = seen["fields"][0].as_array().expect("listed").iter().map(|value| value.as_f64());
+        let expected = report(&end).table("final.csv");
+        let expected: Vec<Option<f64>> = expected.iter().map(|row| row["von_mises"].parse().ok()).collect();
+        let largest = expected.iter().flatten().fold(0.0, |most: f64, &one| most.max(one));
+        assert!(largest > 0.0 && expected.len() == shown.len(), "{name}");
+        for (i, (shown, expected)) in shown.zip(&expected).enumerate() {
+            let apart = shown.unwrap_or(-1.0) - expected.unwrap_or(-1.0);
+            assert!(apart.abs() < 1e-6 * largest, "{name}, {i}: {shown:?} for {expected:?}");
+        }
+    }
+}
+
+/// A strip that is pulled and sheared step by step.
+const PULLED: &str = r#"
+title = "A strip, pulled"
+lattice = { kind = "square", spacing = 1.0 }
+body.shape = { kind = "rectangle", max = [12.0, 7.0] }
+material = { kind = "isotropic", young = 1000.0, poisson = 0.3 }
+rule.mean = { kind = "material" }
+stop.steps = 40
+
+[[roles]]
+region = { kind = "edge", side = "left", depth = 0.6 }
+role = "clamped"
+
+[[roles]]
+region = { kind = "edge", side = "right", depth = 0.6 }
+role = "leader"
+motion = { kind = "velocity", per_step = [0.02, 0.01] }
+"#;
+
+#[test]
+#[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
 fn a_swarms_table_is_read_on_a_phone() {
     assert_sound(&Report::of(&["swarm", "gap"]).tour(&json!({})));
 }

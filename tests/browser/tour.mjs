@@ -298,6 +298,18 @@ async function stress(page) {
   seen.seams = await seams(page);
 }
 
+// A quantity of every particle at a time.
+function fields(page) {
+  return page.evaluate((all) => {
+    const { bodies: [body], player } = window.report;
+    return all.map(([key, time]) => {
+      player.seek(time);
+      body.go(body.animation.times.indexOf(time));
+      return Array.from(body.field(key));
+    });
+  }, asked.fields);
+}
+
 // What the picture buttons save.
 async function saved(page) {
   seen.saved = {};
@@ -376,6 +388,7 @@ try {
   if (seen.views) {
     seen.painter = await page.evaluate(() => window.report.views[0].painter.constructor.name);
     if ((await page.inputValue("#quantity")) === "von_mises") await stress(page);
+    if (asked.fields) seen.fields = await fields(page);
     if (asked.small) seen.small = await small(page);
     await play(page);
     await zoom(page);

@@ -88,7 +88,7 @@ impl<'a> Recorder<'a> {
         self.receive_probes(engine);
         if self.keeps_frames() {
             // A run that was just resumed has not yet looked at a step, and still has the frames of before.
-            RunRecorder::open(&mut self.animation, &mut self.animation_state, engine);
+            RunRecorder::open(&mut self.animation, &mut self.animation_state, (self.scene, engine));
         }
         Recorded {
             snapshots: &self.snapshots,
@@ -115,7 +115,8 @@ impl<'a> Recorder<'a> {
         }
         if self.keeps_frames() {
             let start = Instant::now();
-            RunRecorder::open(&mut self.animation, &mut self.animation_state, engine).watch(engine);
+            RunRecorder::open(&mut self.animation, &mut self.animation_state, (self.scene, engine))
+                .watch(engine);
             self.writing += start.elapsed();
         }
     }
@@ -193,7 +194,7 @@ impl<'a> Recorder<'a> {
         let start = Instant::now();
         if self.keeps_frames() {
             // A run that is gone on with from its last step has seen none.
-            RunRecorder::open(&mut self.animation, &mut self.animation_state, engine);
+            RunRecorder::open(&mut self.animation, &mut self.animation_state, (self.scene, engine));
         }
         if let Some(animation) = &mut self.animation {
             animation.close(self.scene, outcome);

@@ -12,6 +12,7 @@ use crate::engine::Engine;
 use crate::export::figures::configuration::{Setting, configuration_in};
 use crate::export::figures::{Subject, displaced, page};
 use crate::export::report::RunRecorder;
+use crate::export::report::recorder::{PE1, PE2, STRAIN, VON_MISES};
 use crate::flock::pseudo_energy::pe1_among;
 use crate::flock::strain::strain_among;
 use crate::flock::vectors::Vectors;
@@ -114,9 +115,7 @@ impl Shown<'_> {
 
     /// Shape \[count\]; none where roles are shown.
     fn values(&self, frame: usize) -> Option<Vec<f64>> {
-        let tracks = &self.recorder.frames()[frame].tracks;
-        // Of neighbours that are found anew the recorder has kept what the engine saw.
-        let is_kept = tracks.len() > 4;
+        let kept = |quantity| self.recorder.values(frame, quantity);
         Some(match self.colour {
             FilmColour::Role
             | FilmColour::Clearance
@@ -124,17 +123,19 @@ impl Shown<'_> {
             | FilmColour::Speed
             | FilmColour::Acceleration => return None,
             FilmColour::Displacement => self.displacement(frame).iter().map(|[x, y]| x.hypot(y)).collect(),
-            FilmColour::Pe2 => tracks[2].values(),
-            FilmColour::Pe1 if is_kept => tracks[3].values(),
-            FilmColour::Strain if is_kept => tracks[4].values(),
-            FilmColour::Pe1 => self.by_neighbours(frame, |i, neighbours, places| {
-                pe1_among(self.engine.flock(), i, neighbours, places)
+            FilmColour::Pe2 => kept(PE2)?,
+            FilmColour::Pe1 => kept(PE1).unwrap_or_else(|| {
+                self.by_neighbours(frame, |i, neighbours, places| {
+                    pe1_among(self.engine.flock(), i, neighbours, places)
+                })
             }),
-            FilmColour::Strain => self.by_neighbours(frame, |i, neighbours, places| {
-                let strain = strain_among(self.engine.flock(), i, neighbours, places);
-                strain.map_or(f64::NAN, |strain| strain.largest())
+            FilmColour::Strain => kept(STRAIN).unwrap_or_else(|| {
+                self.by_neighbours(frame, |i, neighbours, places| {
+                    let strain = strain_among(self.engine.flock(), i, neighbours, places);
+                    strain.map_or(f64::NAN, |strain| strain.largest())
+                })
             }),
-            FilmColour::VonMises => self.stress(frame),
+            FilmColour::VonMises => kept(VON_MISES).unwrap_or_else(|| self.stress(frame)),
         })
     }
 

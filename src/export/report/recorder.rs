@@ -1,6 +1,7 @@
 //! The frames of a run, kept while it goes on, and the view of the body that they make.
 
 use std::borrow::Cow;
+use std::cell::OnceCell;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -38,6 +39,11 @@ const MOST_EXACT: usize = 250_000;
 /// Frames of a body whose equilibrium was solved for, on its way from no load to all of it.
 const LOAD_FRAMES: usize = 20;
 
+pub(in crate::export) const PE1: &str = "pe1";
+pub(in crate::export) const PE2: &str = "pe2";
+pub(in crate::export) const STRAIN: &str = "strain";
+pub(in crate::export) const VON_MISES: &str = "von_mises";
+
 /// The state of a recorder, for a checkpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AnimationState<'a> {
@@ -53,15 +59,17 @@ pub struct AnimationState<'a> {
 }
 
 /// Values that frames hold of each particle, of a body of so many.
-fn channels(total: usize, are_neighbours_known: bool, has_stresses: bool) -> Vec<Channel> {
+fn channels(scene: &Scene, total: usize, are_neighbours_known: bool, has_stresses: bool) -> Vec<Channel> {
     let [bits, others] = if total <= MOST_FINE { [FINE_BITS; 2] } else { [COARSE_BITS, COLOUR_BITS] };
     let channel = |name, bits| Channel { name, bits };
-    let mut channels = vec![channel("dx", bits), channel("dy", bits), channel("pe2", others)];
+    let mut channels = vec![channel("dx", bits), channel("dy", bits), channel(PE2, others)];
     // Neighbours that are found anew at every step, or are not in a sample, are known to the engine alone.
     if !are_neighbours_known {
-        channels.extend(["pe1", "strain"].map(|name| channel(name, others)));
-        channels.extend(has_stresses.then(|| channel(VON_MISES, others)));
+        channels.extend([PE1, STRAIN].map(|name| channel(name, others)));
     }
+    // An increment costs more than its stress, a step less: of steps the page computes it.
+    let is_kept = !are_neighbours_known || scene.equilibrium.is_some();
+    channels.extend((has_stresses && is_kept).then(|| channel(VON_MISES, others)));
     channels
 }
 
@@ -79,7 +87,7 @@ pub(in crate::export) struct Packed {
 }
 
 /// Memory that the report of a run takes, before it begins.
-pub(in crate::export) fn packed(plan: &Plan, is_solved_at_once: bool) -> Packed {
+pub(in crate::export) fn packed(scene: &Scene, plan: &Plan) -> Packed {
     /// Bytes of a particle's place and neighbours as text: rows of a lattice are next to nothing.
     const TEXT: usize = 6;
     /// Bytes of its numbers at the end as text; where nothing has come yet, they are next to nothing too.
@@ -88,8 +96,8 @@ pub(in crate::export) fn packed(plan: &Plan, is_solved_at_once: bool) -> Packed 
     let (total, is_sample) = (plan.setup.body.total(), plan.setup.body.part.is_some());
     let count = if is_sample { sample::size_of(total) } else { total };
     let are_neighbours_known = !is_sample && plan.setup.present_radius.is_none();
-    let frames = Frames::new(count, channels(total, are_neighbours_known, plan.setup.cells.is_some()));
-    let steps = match (is_solved_at_once, is_sample) {
+    let frames = Frames::new(count, channels(scene, total, are_neighbours_known, plan.setup.cells.is_some()));
+    let steps = match (scene.is_solved_at_once(), is_sample) {
         (true, true) => 0,
         (true, false) => LOAD_FRAMES,
         _ => plan.stop.steps,
@@ -128,11 +136,11 @@ pub struct RunRecorder {
 
 impl RunRecorder {
     /// From the engine before its first step.
-    fn new(engine: &Engine) -> Self {
+    fn new(scene: &Scene, engine: &Engine) -> Self {
         let sample = Sample::of(engine);
         let count = sample.as_ref().map_or(engine.body().count(), Sample::count);
         let are_neighbours_known = sample.is_none() && engine.lasting_neighbours().is_some();
-        let channels = channels(engine.body().total(), are_neighbours_known, engine.cells().is_some());
+        let channels = channels(scene, engine.body().total(), are_neighbours_known, engine.cells().is_some());
         let roles = roles(engine, sample.as_ref()).into_owned();
         let values = vec![Vec::new(); channels.len()];
         let frames = Frames::new(count, channels);
@@ -144,9 +152,9 @@ impl RunRecorder {
     pub fn open<'a>(
         recorder: &'a mut Option<Self>,
         earlier: &mut Option<AnimationState<'_>>,
-        engine: &Engine,
+        (scene, engine): (&Scene, &Engine),
     ) -> &'a mut Self {
-        let recorder = recorder.get_or_insert_with(|| Self::new(engine));
+        let recorder = recorder.get_or_insert_with(|| Self::new(scene, engine));
         let earlier = earlier.take().filter(|earlier| earlier.stride == recorder.stride());
         if let Some(AnimationState { frames, interval, first_roles, roles, changes, .. }) = earlier {
             let mut frames = frames.into_owned();
@@ -163,7 +171,7 @@ impl RunRecorder {
     /// Looks at a step.
     pub fn watch(&mut self, engine: &Engine) {
         if self.frames.wants(engine.step()) {
-            self.take(engine, 1.0);
+            self.take(engine, 1.0, || von_mises(engine, 1.0));
             self.frames.keep(engine.step(), &slices(&self.values));
         }
     }
@@ -191,17 +199,28 @@ impl RunRecorder {
     }
 
     /// The frame of the end, which is exact whatever its step; of a body that was solved for at once, the way there.
-    fn finish(&mut self, engine: &Engine, is_solved: bool) {
+    fn finish(&mut self, scene: &Scene, engine: &Engine, is_solved: bool) {
         if is_solved {
-            self.frames = Frames::new(self.frames.count, self.frames.channels.clone());
+            let mut channels = self.frames.channels.clone();
+            // Of an even load the page has as many parts of what it knows exactly.
+            if is_linear(scene) && self.is_exact() {
+                channels.retain(|channel| channel.name != VON_MISES);
+            }
+            self.values.truncate(channels.len());
+            self.frames = Frames::new(self.frames.count, channels);
             // What the page does not compute is known of the whole load.
             let first = if self.sample.is_some() { LOAD_FRAMES } else { 0 };
+            let whole = OnceCell::new();
             for frame in first..=LOAD_FRAMES {
-                self.take(engine, frame as f64 / LOAD_FRAMES as f64);
+                let part = frame as f64 / LOAD_FRAMES as f64;
+                self.take(engine, part, || match is_linear(scene) {
+                    false => von_mises(engine, part),
+                    true => whole.get_or_init(|| von_mises(engine, 1.0)).iter().map(|v| part * v).collect(),
+                });
                 self.frames.keep(frame, &slices(&self.values));
             }
         } else {
-            self.take(engine, 1.0);
+            self.take(engine, 1.0, || von_mises(engine, 1.0));
             self.frames.keep_last(engine.step(), &slices(&self.values));
         }
         // Nothing is taken any more, and the page is yet to be packed.
@@ -209,26 +228,25 @@ impl RunRecorder {
     }
 
     /// Values of every channel, displacements times `part`.
-    fn take(&mut self, engine: &Engine, part: f64) {
+    fn take(&mut self, engine: &Engine, part: f64, stress: impl Fn() -> Vec<f64>) {
         let (present, reference, sample) = (engine.present(), &engine.body().reference, &self.sample);
         let take = |values: &mut Vec<f64>, of: &(dyn Fn(usize) -> f64 + Sync)| match sample {
             None => (0..reference.len()).into_par_iter().map(of).collect_into_vec(values),
             Some(sample) => *values = sample.numbers(of),
         };
-        let [dx, dy, pe2, others @ ..] = &mut self.values[..] else {
-            unreachable!("there are three or more")
-        };
-        take(dx, &|i| part * (present.x[i] - reference.x[i]));
-        take(dy, &|i| part * (present.y[i] - reference.y[i]));
-        take(pe2, &|i| engine.pe2(i));
-        if let [pe1, strain, of_cells @ ..] = others {
-            take(pe1, &|i| engine.pe1(i));
-            take(strain, &|i| engine.strain(i).map_or(f64::NAN, |strain| strain.largest()));
-            if let [von_mises] = of_cells {
-                let particles =
-                    Stresses::at_present(engine).map_or_else(Vec::new, |stresses| stresses.particles);
-                let of = |i: usize| Some(particles.get(i)?.as_ref()?.von_mises);
-                take(von_mises, &|i| of(i).unwrap_or(f64::NAN));
+        let [dx, dy] = [(&present.x, &reference.x), (&present.y, &reference.y)]
+            .map(|(now, then)| move |i: usize| part * (now[i] - then[i]));
+        for (values, channel) in self.values.iter_mut().zip(&self.frames.channels) {
+            match channel.name {
+                "dx" => take(values, &dx),
+                "dy" => take(values, &dy),
+                PE1 => take(values, &|i| engine.pe1(i)),
+                PE2 => take(values, &|i| engine.pe2(i)),
+                STRAIN => take(values, &|i| engine.strain(i).map_or(f64::NAN, |strain| strain.largest())),
+                _ => {
+                    let stress = stress();
+                    take(values, &|i| stress[i]);
+                }
             }
         }
         self.take_roles(engine);
@@ -250,18 +268,29 @@ impl RunRecorder {
     /// Takes the frames of the end, after which there are no others.
     pub fn close(&mut self, scene: &Scene, outcome: &Outcome) {
         self.is_solved = is_solved_at_once(scene, outcome);
-        self.finish(&outcome.engine, self.is_solved);
+        self.finish(scene, &outcome.engine, self.is_solved);
     }
 
     /// The animation of a run that is closed, for the rank that writes; of frames that are too many for a page half are let go.
     pub fn stage(&mut self, scene: &Scene, outcome: &Outcome) -> View {
         let (engine, is_solved) = (&outcome.engine, self.is_solved);
-        self.view(scene, engine, is_solved, engine.body().count() <= MOST_EXACT)
+        self.view(scene, engine, is_solved, self.is_exact())
+    }
+
+    /// Whether the page has the final values exactly.
+    fn is_exact(&self) -> bool {
+        self.sample.is_none() && self.frames.count <= MOST_EXACT
     }
 
     #[cfg(test)]
     pub(super) fn sample(&self) -> Option<&Sample> {
         self.sample.as_ref()
+    }
+
+    /// A quantity of every particle in a frame, where it is kept.
+    pub(in crate::export) fn values(&self, frame: usize, quantity: &str) -> Option<Vec<f64>> {
+        let channel = self.frames.channels.iter().position(|channel| channel.name == quantity)?;
+        Some(self.frames.kept()[frame].tracks[channel].values())
     }
 
     pub(in crate::export) fn frames(&self) -> &[Frame] {
@@ -291,25 +320,28 @@ impl RunRecorder {
     /// A body as it is, in a single frame.
     #[cfg(feature = "live")]
     pub(crate) fn still(scene: &Scene, engine: &Engine) -> View {
-        let mut recorder = Self::new(engine);
-        recorder.finish(engine, false);
+        let mut recorder = Self::new(scene, engine);
+        recorder.finish(scene, engine, false);
         recorder.view(scene, engine, false, false)
     }
 
     fn view(&mut self, scene: &Scene, engine: &Engine, is_solved: bool, is_exact: bool) -> View {
         let mut stage = View::new(animation(scene, engine, is_solved));
+        // Stress before the last frame is kept, a part of what is exact, or computed by the page.
+        let is_even = is_solved && is_exact && is_linear(scene);
+        let is_known = self.frames.channels.iter().any(|channel| channel.name == VON_MISES) || is_even;
+        let Animation { stress, quantities, .. } = &mut stage.animation;
+        if is_known {
+            *stress = None;
+        } else if stress.is_none() {
+            quantities.retain(|quantity| quantity.key != VON_MISES);
+        }
         stage.set_roles(&self.first_roles, &self.changes);
         if let Some(sample) = &self.sample {
             stage.set_reference(&sample.reference);
             stage.set_ids(sample.ids.iter().copied());
             // A dot stands for those around it as well.
             stage.animation.spacing *= sample.stride() as f64;
-            let is_stress = |channel: &Channel| channel.name == VON_MISES;
-            if self.frames.channels.iter().any(is_stress) {
-                let quantities = &mut stage.animation.quantities;
-                quantities.retain(|quantity| quantity.key != VON_MISES);
-                quantities.push(von_mises(scene));
-            }
         } else {
             stage.set_reference(&engine.body().reference);
             if let Some(numbering) = &engine.body().numbering {
@@ -325,7 +357,7 @@ impl RunRecorder {
                 stage.set_cells(&cells);
             }
         }
-        if is_exact && self.sample.is_none() {
+        if is_exact {
             add_exact(&mut stage, scene, engine);
         }
         let encoded = encoded(&mut self.frames, stage.size());
@@ -348,6 +380,16 @@ fn roles<'a>(engine: &'a Engine, sample: Option<&Sample>) -> Cow<'a, [Role]> {
     sample.map_or(Cow::Borrowed(engine.roles()), |sample| Cow::Owned(of_sample(sample)))
 }
 
+/// The von Mises stress around each particle \[force / length^2\] under a part of the displacements, shape \[count\]; NaN where
+/// there is none.
+fn von_mises(engine: &Engine, part: f64) -> Vec<f64> {
+    let mut displacement = engine.displacements();
+    displacement.x.iter_mut().chain(&mut displacement.y).for_each(|u| *u *= part);
+    let particles = Stresses::under(engine, &displacement).map(|stresses| stresses.particles);
+    let of = |stress: Option<StressState>| stress.map_or(f64::NAN, |stress| stress.von_mises);
+    particles.map_or_else(Vec::new, |particles| particles.into_iter().map(of).collect())
+}
+
 fn slices(values: &[Vec<f64>]) -> Vec<&[f64]> {
     values.iter().map(Vec::as_slice).collect()
 }
@@ -359,17 +401,13 @@ pub(super) fn is_solved_at_once(scene: &Scene, outcome: &Outcome) -> bool {
 
 fn animation(scene: &Scene, engine: &Engine, is_solved: bool) -> Animation {
     let unit = scene.unit();
-    let mut quantities =
-        vec![Quantity::new("pe1", "PE1", format!("{unit}²")), Quantity::new("pe2", "PE2", unit)];
-    // The page has one material for all particles; of inclusions it shows the stress at the end alone.
-    let elastic = scene.material.as_ref().filter(|_| scene.inclusions.is_empty());
-    let stress = elastic.map(|elastic| stress(elastic, scene.mean));
+    let mut quantities = vec![Quantity::new(PE1, "PE1", format!("{unit}²")), Quantity::new(PE2, "PE2", unit)];
     // At rest nothing moves.
-    quantities.retain(|quantity| quantity.key != "pe2" || !is_solved);
-    if stress.is_some() {
-        quantities.push(von_mises(scene));
+    quantities.retain(|quantity| quantity.key != PE2 || !is_solved);
+    if engine.cells().is_some() {
+        quantities.push(Quantity::new(VON_MISES, "von Mises stress", Units::of(scene).stress));
     }
-    quantities.push(Quantity::new("strain", "largest strain", ""));
+    quantities.push(Quantity::new(STRAIN, "largest strain", ""));
     let clock = match is_solved {
         true => Clock { quantity: "load", unit: "%" },
         false => Clock { quantity: scene.counts(), unit: "" },
@@ -380,27 +418,38 @@ fn animation(scene: &Scene, engine: &Engine, is_solved: bool) -> Animation {
         clock,
         spacing: engine.body().lattice.spacing(),
         quantities,
-        linear: stress.as_ref().is_some_and(|stress| stress.linear) && scene.fracture.is_none(),
-        stress,
+        linear: is_linear(scene),
+        stress: engine
+            .cells()
+            .zip(engine.elastic())
+            .and_then(|(cells, elastic)| stress(scene, cells, elastic)),
         ..Animation::default()
     }
 }
 
-const VON_MISES: &str = "von_mises";
-
-fn von_mises(scene: &Scene) -> Quantity {
-    Quantity::new(VON_MISES, "von Mises stress", Units::of(scene).stress)
+/// Whether displacements and stresses are as many times as large as their cause.
+fn is_linear(scene: &Scene) -> bool {
+    scene.material.is_some() && !turns(scene) && scene.fracture.is_none()
 }
 
-fn stress(elastic: &Elastic, mean: Mean) -> Stress {
+/// Whether stress is that of cells turned back first.
+fn turns(scene: &Scene) -> bool {
+    matches!(scene.mean, Mean::Material { rotation: Rotation::Corotated })
+}
+
+/// What the page computes stress of steps by; nothing for what it leaves out.
+fn stress(scene: &Scene, cells: &Cells, elastic: &Elastic) -> Option<Stress> {
+    if !cells.inclusions.is_empty() || cells.average_dilatations(elastic) {
+        return None;
+    }
     let unit = |k: usize| elastic.stress([0, 1, 2].map(|axis| f64::from(u8::from(axis == k))));
     let columns = [unit(0), unit(1), unit(2)];
     let across = match elastic.constants() {
         Constants::Isotropic { poisson, plane: Plane::Strain, .. } => poisson,
         _ => 0.0,
     };
-    let linear = !matches!(mean, Mean::Material { rotation: Rotation::Corotated });
-    Stress { stiffness: [0, 1, 2].map(|row| [0, 1, 2].map(|k| columns[k][row])), across, linear }
+    let stiffness = [0, 1, 2].map(|row| [0, 1, 2].map(|k| columns[k][row]));
+    Some(Stress { stiffness, across, turns: turns(scene) })
 }
 
 /// Every bond with the step at which it broke; a bond without one lives.
@@ -430,8 +479,8 @@ fn add_exact(stage: &mut View, scene: &Scene, engine: &Engine) {
     let all = || 0..engine.body().count();
     add("x", "x", unit, &mut engine.present().x.iter().copied());
     add("y", "y", unit, &mut engine.present().y.iter().copied());
-    add("pe1", "PE1", &format!("{unit}²"), &mut all().map(|i| engine.pe1(i)));
-    add("pe2", "PE2", unit, &mut all().map(|i| engine.pe2(i)));
+    add(PE1, "PE1", &format!("{unit}²"), &mut all().map(|i| engine.pe1(i)));
+    add(PE2, "PE2", unit, &mut all().map(|i| engine.pe2(i)));
     for (k, name) in ["xx", "yy", "xy"].into_iter().enumerate() {
         let component = |strain: &Option<Strain>| strain.map_or(f64::NAN, |strain| strain.components[k]);
         add(&format!("strain_{name}"), &format!("strain {name}"), "", &mut strains.iter().map(component));

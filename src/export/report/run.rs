@@ -68,8 +68,12 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
     let mut note = if is_solved && is_sample {
         "Solved for its rest, not stepped: the rest alone is shown.".to_owned()
     } else if is_solved {
+        let meaning = match animation.linear {
+            true => ", as under a load that grows evenly",
+            false => "; the last alone is an equilibrium, and [load_steps] shows others",
+        };
         format!(
-            "Solved for its rest, not stepped: {frames} frames in equal increments of the displacement, as under a load that grows evenly."
+            "Solved for its rest, not stepped: {frames} frames in equal increments of the displacement{meaning}."
         )
     } else {
         let (steps, counts) = (outcome.engine.step(), animation.clock.quantity);
@@ -95,12 +99,13 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
         );
         return note + " final.csv has all of them, to the last digit.";
     }
+    let computed = if animation.stress.is_some() { "PE1, strain and stress" } else { "PE1 and strain" };
     note += &format!(
-        " Displacements are kept to {bits} bits of each frame's range; PE1, strain and stress are computed from them."
+        " Displacements are kept to {bits} bits of each frame's range; {computed} are computed from them."
     );
-    if animation.stress.is_some() && !(is_solved && animation.linear) {
-        note += " Stress before the last frame is that of a mean gradient over each particle's neighbours: at edges and corners it is not \
-                 that of the cells, which the last frame, final.csv and films have.";
+    if animation.stress.is_some() && outcome.engine.free_edge().is_some() {
+        note += " Stress before the last frame is the mean of each particle's cells, at the last recovered along the outline too, as in \
+                 final.csv and films.";
     }
     note += if animation.exact.is_empty() {
         " The body is too large for its last numbers to be kept exactly: final.csv has them."
@@ -124,11 +129,11 @@ fn facts(scene: &Scene, outcome: &Outcome, summary: &Summary) -> Vec<(String, St
     let roles: Vec<String> = roles
         .iter()
         .filter(|(count, _)| *count > 0)
-        .map(
-            |&(count, name)| {
-                if name == "frame" { format!("{count} in the frame") } else { counted(count, name) }
-            },
-        )
+        .map(|&(count, name)| match name {
+            "frame" => format!("{count} in the frame"),
+            "clamped" => format!("{count} clamped"),
+            _ => counted(count, name),
+        })
         .collect();
     fact("Particles", format!("{} ({})", counts.particles, roles.join(", ")));
     fact("Pairs of neighbours", counts.neighbour_pairs.to_string());

@@ -141,7 +141,7 @@ mod tests {
             let plan = Plan::of_part(scene, &team).unwrap_or_else(|error| panic!("{error}"));
             let (mut recorder, mut left) = (None, left.cloned());
             let mut see = |engine: &Engine, _: f64| {
-                RunRecorder::open(&mut recorder, &mut left, engine).watch(engine);
+                RunRecorder::open(&mut recorder, &mut left, (scene, engine)).watch(engine);
                 ControlFlow::Continue(())
             };
             let mut observer = EachStep(&mut see);
@@ -255,7 +255,7 @@ mod tests {
         let mut whole = None;
         let plan = Plan::new(&scene).expect("can be laid out");
         let mut see = |engine: &Engine, _: f64| {
-            RunRecorder::open(&mut whole, &mut None, engine).watch(engine);
+            RunRecorder::open(&mut whole, &mut None, (&scene, engine)).watch(engine);
             ControlFlow::Continue(())
         };
         run_to_equilibrium_watched(&scene, plan, &mut EachStep(&mut see)).expect("an end");

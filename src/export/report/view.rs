@@ -44,7 +44,7 @@ pub(crate) struct Animation {
     pub exact: Vec<Quantity>,
     /// Corners of a cell; zero where there are no cells.
     pub corners: usize,
-    /// Stress from strain, for the von Mises stress.
+    /// For the von Mises stress where frames have none.
     pub stress: Option<Stress>,
     /// Whether displacements scale with their cause, so that drawing them at another size is correct.
     pub linear: bool,
@@ -79,8 +79,8 @@ pub(crate) struct Stress {
     pub stiffness: [[f64; 3]; 3],
     /// Share of xx + yy that acts across the plane \[1\].
     pub across: f64,
-    /// Whether the rule's strain is the linear one; else turns are taken out first.
-    pub linear: bool,
+    /// Whether cells are turned back before they are strained.
+    pub turns: bool,
 }
 
 #[derive(Clone, Debug, Serialize)]

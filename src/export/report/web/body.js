@@ -88,6 +88,7 @@ export class Body {
         }
       }
     }
+    this.tornAt = torn;
     const order = Array.from(torn.keys());
     if (dead.size) order.sort((a, b) => torn[a] - torn[b] || a - b);
     this.trianglesPerCell = Math.max(corners - 2, 0);
@@ -175,17 +176,19 @@ export class Body {
   }
 
   compute(key, out) {
-    if (this.frames.has(key)) this.frames.read(key, this.at, out);
+    const exact = this.exact.get(key);
+    const isEven = key === "von_mises" && this.isEvenLoad;
+    if (exact && (this.at === this.last || isEven)) {
+      const part = this.at === this.last ? 1 : this.step / this.animation.times[this.last];
+      exact.forEach((value, i) => (out[i] = part * value));
+    }
+    else if (this.frames.has(key)) this.frames.read(key, this.at, out);
     else if (key === "displacement") for (let i = 0; i < this.count; i++) out[i] = Math.hypot(this.dx[i], this.dy[i]);
     else if (key === "pe1") this.pe1(out);
     else if (key === "strain") this.eachStrain((i, xx, yy, xy) => {
       out[i] = Math.abs(xx + yy) / 2 + Math.hypot((xx - yy) / 2, xy);
     }, out);
-    else if (key === "von_mises" && this.exact.has(key) && (this.at === this.last || this.isEvenLoad)) {
-      const part = this.at === this.last ? 1 : this.step / this.animation.times[this.last];
-      this.exact.get(key).forEach((value, i) => (out[i] = part * value));
-    }
-    else if (key === "von_mises") this.vonMises(out);
+    else if (key === "von_mises" && this.animation.stress) this.vonMises(out);
     else out.fill(NaN);
   }
 
@@ -248,31 +251,48 @@ export class Body {
     return gradients;
   }
 
-  // Calls with the right stretch less one, which a turn leaves alone, of every particle that has one.
+  // Calls with the right stretch less one of every particle that has one.
   eachStrain(take, out) {
     const g = this.gradient();
     for (let i = 0; i < this.count; i++) {
-      const [a, b, c, d] = [1 + g[4 * i], g[4 * i + 1], g[4 * i + 2], 1 + g[4 * i + 3]];
-      if (Number.isNaN(a)) {
-        out[i] = NaN;
-        continue;
-      }
-      const turn = Math.atan2(c - b, a + d);
-      const [cos, sin] = [Math.cos(turn), Math.sin(turn)];
-      take(i, cos * a + sin * c - 1, cos * d - sin * b - 1, (cos * b + sin * d + cos * c - sin * a) / 2);
+      if (Number.isNaN(g[4 * i])) out[i] = NaN;
+      else take(i, ...stretch(g[4 * i], g[4 * i + 1], g[4 * i + 2], g[4 * i + 3]));
     }
   }
 
+  // Of the mean strain of the whole cells around a particle, each by its area, as material/stress.rs has it.
   vonMises(out) {
-    const { stiffness, across, linear } = this.animation.stress;
-    const stress = (i, xx, yy, shear) => {
-      const [p, q, s] = stiffness.map(([a, b, c]) => a * xx + b * yy + c * shear);
+    const { cells, X, Y, dx, dy, count } = this;
+    const { corners, stress: { stiffness, across, turns } } = this.animation;
+    const sums = new Float64Array(4 * count);
+    for (let cell = 0; cell < cells.length; cell += corners) {
+      if (this.tornAt[cell / corners] <= this.step) continue;
+      let [area, ux, uy, vx, vy] = [0, 0, 0, 0, 0];
+      for (let k = 0; k < corners; k++) {
+        const [a, b] = [cells[cell + k], cells[cell + (k + 1) % corners]];
+        const [x, y] = [X[b] - X[a], Y[b] - Y[a]];
+        const [u, v] = [dx[a] + dx[b] - 2 * dx[cells[cell]], dy[a] + dy[b] - 2 * dy[cells[cell]]];
+        area += (X[a] - X[cells[cell]]) * y - (Y[a] - Y[cells[cell]]) * x;
+        ux += u * y;
+        uy -= u * x;
+        vx += v * y;
+        vy -= v * x;
+      }
+      const [a, b, c, d] = [ux, uy, vx, vy].map((sum) => sum / area);
+      const strain = turns ? stretch(a, b, c, d) : [a, d, (b + c) / 2];
+      // Corners that repeat the last one are of cells with fewer.
+      for (let k = 0; k < corners && (k === 0 || cells[cell + k] !== cells[cell + k - 1]); k++) {
+        const at = 4 * cells[cell + k];
+        strain.forEach((component, c) => (sums[at + c] += area * component));
+        sums[at + 3] += area;
+      }
+    }
+    for (let i = 0; i < count; i++) {
+      const [xx, yy, xy] = [0, 1, 2].map((c) => sums[4 * i + c] / sums[4 * i + 3]);
+      const [p, q, s] = stiffness.map(([a, b, c]) => a * xx + b * yy + 2 * c * xy);
       const z = across * (p + q);
       out[i] = Math.sqrt(((p - q) ** 2 + (q - z) ** 2 + (z - p) ** 2) / 2 + 3 * s * s);
-    };
-    if (!linear) return this.eachStrain((i, xx, yy, xy) => stress(i, xx, yy, 2 * xy), out);
-    const g = this.gradient();
-    for (let i = 0; i < this.count; i++) stress(i, g[4 * i], g[4 * i + 3], g[4 * i + 1] + g[4 * i + 2]);
+    }
   }
 
   // The quantities of one particle at this frame, as [{key, label, unit, value}]; at the last frame to the last bit.
@@ -295,4 +315,12 @@ export class Body {
     }
     return list;
   }
+}
+
+// The stretch less one (xx, yy, xy) of a gradient of the displacement, which a turn leaves alone.
+function stretch(ux, uy, vx, vy) {
+  const [a, d] = [1 + ux, 1 + vy];
+  const turn = Math.atan2(vx - uy, a + d);
+  const [cos, sin] = [Math.cos(turn), Math.sin(turn)];
+  return [cos * a + sin * vx - 1, cos * d - sin * uy - 1, (cos * uy + sin * d + cos * vx - sin * a) / 2];
 }

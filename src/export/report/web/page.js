@@ -71,7 +71,7 @@ async function startFilm() {
   listenToControls();
   listenToCompare();
   listenToKeys();
-  choose(bodies.length > 1 || animation.stress ? "von_mises" : "role");
+  choose(animation.quantities.some(({ key }) => key === "von_mises") ? "von_mises" : "role");
   const before = bodies.slice(0, -1);
   for (const body of before) await body.frames.load(() => {});
   await bodies.at(-1).frames.load((ready) => {
