@@ -248,7 +248,16 @@ fn killed(folder: &Path, out: &'static str, steps: usize) -> [&'static str; 3] {
 fn ranks_that_are_to_make_different_runs_are_refused() {
     let folder = temporary();
     let resumed = [killed(folder.path(), "p", 10), killed(folder.path(), "q", 20)];
+    for (name, moved) in [("one", "0.1"), ("two", "0.2")] {
+        let folder = folder.path().join(name);
+        std::fs::create_dir(&folder).expect("a folder");
+        let rows = (1..=4).map(|id| format!("{id},{moved},0\n"));
+        std::fs::write(folder.join("m.csv"), String::from("id,ux,uy\n") + &rows.collect::<String>())
+            .expect("written");
+        std::fs::write(folder.join("s.toml"), LED_BY_A_FILE).expect("written");
+    }
     let before = names_in(folder.path());
+    let with = |option: &'static str| ["run", "tension", "--figures", "none", option];
     let set = |words: &'static str| ["run", "tension", "--set", words];
     for [first, second] in [
         // A frame is no part of the planned body.
@@ -256,6 +265,10 @@ fn ranks_that_are_to_make_different_runs_are_refused() {
         [&set("lattice.spacing=0.5"), &set("lattice.spacing=0.25")],
         [&resumed[0], &resumed[1]],
         [&["run", "tension"], &resumed[0]],
+        // What all of them do together.
+        [&with("--no-report"), &with("--quiet")],
+        [&with("--checkpoint-every=60s"), &with("--checkpoint-every=never")],
+        [&["run", "one/s.toml", "--figures", "none"], &["run", "two/s.toml", "--figures", "none"]],
     ] {
         let both = [first, &[":", "-n", "1", PROGRAM], second].concat();
         let output = on_ranks(1, &both, folder.path());
@@ -265,6 +278,19 @@ fn ranks_that_are_to_make_different_runs_are_refused() {
         assert_eq!(names_in(folder.path()), before, "{both:?}");
     }
 }
+
+/// A body whose left edge is moved as a file says.
+const LED_BY_A_FILE: &str = r#"
+title = "Led by a file"
+lattice = { kind = "square", spacing = 1.0 }
+body.shape = { kind = "grid", columns = 20, rows = 4 }
+stop.steps = 5
+
+[[roles]]
+region = { kind = "edge", side = "left" }
+role = "leader"
+motion = { kind = "csv", file = "m.csv", steps = 1 }
+"#;
 
 #[test]
 #[ignore = "needs mpirun"]
@@ -370,7 +396,9 @@ fn a_run_in_parts_has_a_report_of_a_sample() {
         assert!(says("three") && !says("alone"), "{name}");
         let [found, expected] = ["three", "alone"].map(|out| folder.path().join(out));
         assert_same(&found, &expected, name);
-        [found, expected].map(|of| std::fs::remove_dir_all(of).expect("removed"));
+        for folder in [found, expected] {
+            std::fs::remove_dir_all(folder).expect("removed");
+        }
     }
 }
 

@@ -80,6 +80,11 @@ impl CheckpointArguments {
         )
     }
 
+    /// The intervals asked for, as text.
+    pub fn every(&self) -> String {
+        format!("{:?}", self.checkpoint_every)
+    }
+
     /// The run to go on with, if that is asked for.
     pub fn left(&self) -> Result<Option<ResumedRun>, CheckpointError> {
         self.resume.as_deref().map(ResumedRun::find).transpose()

@@ -115,7 +115,7 @@ impl Prepared {
         let is_parted = team.is_some() && arguments.is_parted(&scene);
         if let (Some(team), true) = (team, is_parted) {
             // What follows all ranks do together.
-            begin.agree(fnv1a(&serde_json::to_vec(&scene.raw).expect("a scene was read from text")))?;
+            begin.agree(arguments.common(&scene))?;
             let scene = interruptible(scene);
             let plan = Plan::of_part(&scene, team)?;
             let digest = digest_of_parts(&plan, team);
@@ -136,12 +136,11 @@ impl Prepared {
         Ok(Self { left, asked, scene, words, plan, digest, is_parted })
     }
 
-    /// A fingerprint of what all ranks must have in common: plan, scene, and the state to go on from.
-    fn common(&self) -> u64 {
-        let scene = serde_json::to_vec(&self.scene.raw).expect("a scene was read from text");
-        let state = self.left.iter().flat_map(|left| left.fingerprint.to_le_bytes());
-        let all: Vec<u8> = self.digest.to_le_bytes().into_iter().chain(scene).chain(state).collect();
-        fnv1a(&all)
+    /// A fingerprint of what all ranks must have in common: plan, scene, options, and the state to go on from.
+    fn common(&self, arguments: &RunArguments) -> u64 {
+        let state = self.left.iter().map(|left| left.fingerprint);
+        let all = [self.digest, arguments.common(&self.scene)].into_iter().chain(state);
+        fnv1a(&all.flat_map(u64::to_le_bytes).collect::<Vec<_>>())
     }
 }
 
@@ -154,8 +153,7 @@ fn interruptible(mut scene: Scene) -> Scene {
 }
 
 /// The part of a rank that neither prints nor writes, and has the whole body.
-fn help_to_run(prepared: Prepared, team: &Team, begin: Start<'_>) -> Result<ExitCode, Refusal> {
-    let common = prepared.common();
+fn help_to_run(prepared: Prepared, common: u64, team: &Team, begin: Start<'_>) -> Result<ExitCode, Refusal> {
     let mut observer = Interrupted(interrupt::serves());
     begin.begin(common)?;
     let from = prepared.left.map(|left| left.checkpoint).map(|from| (from.engine, from.residual));
@@ -172,11 +170,11 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
         Ok(prepared) => prepared,
         Err(refusal) => return Err(begin.refused(refusal)),
     };
-    let common = team.map_or(0, |_| prepared.common());
+    let common = team.map_or(0, |_| prepared.common(arguments));
     begin.agree(common)?;
     let others = team.filter(|team| !team.is_first());
     if let (Some(team), false) = (others, prepared.is_parted) {
-        return help_to_run(prepared, team, begin);
+        return help_to_run(prepared, common, team, begin);
     }
     let Prepared { left, asked, scene, words, mut plan, digest, is_parted } = prepared;
     let shown = arguments.publish.as_ref();
@@ -325,6 +323,16 @@ impl RunArguments {
 
     fn outputs(&self) -> Outputs {
         Outputs { figures: self.figures.figures, report: !self.report.no_report }
+    }
+
+    /// A fingerprint of what ranks must have in common before they lay out a body: the scene, with what it read from files, and
+    /// the options that decide what all of them do together.
+    fn common(&self, scene: &Scene) -> u64 {
+        let mut all = serde_json::to_vec(&scene.raw).expect("a scene was read from text");
+        let asked =
+            (self.outputs(), self.checkpoints.every(), [self.film.is_asked(), self.record.is_asked()]);
+        all.extend(format!("{:?} {asked:?} {:?}", scene.roles, self.publish).bytes());
+        fnv1a(&all)
     }
 
     /// The requested run, independent of the working folder.

@@ -77,7 +77,7 @@ pub(crate) fn planned(scene: &Scene, setup: &Setup) -> Vec<String> {
         return Vec::new();
     }
     let mut cautions = Doubts::of(body, flock, roles, &body.reference).cautions(scene);
-    cautions.extend(layout::roles::cautions(changes, body.count()));
+    cautions.extend(layout::roles::cautions(changes, body, None));
     cautions
 }
 
@@ -87,8 +87,6 @@ pub(crate) fn seen(scene: &Scene, engine: &Engine) -> Vec<String> {
         Doubts::of(engine.body(), engine.flock(), engine.roles(), engine.present());
     let [followers, unmoved, long] = [followers, unmoved, long].map(|own| engine.count_of_parts(own));
     let mut cautions = Doubts { followers, unmoved, long }.cautions(scene);
-    if engine.body().part.is_none() {
-        cautions.extend(layout::roles::cautions(engine.changes(), engine.body().count()));
-    }
+    cautions.extend(layout::roles::cautions(engine.changes(), engine.body(), engine.parted()));
     cautions
 }

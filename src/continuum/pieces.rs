@@ -92,7 +92,12 @@ pub fn require_connected(body: &Body, neighbours: &Neighbours, team: &Team) -> R
     let sees = |i: usize| neighbours.of(i).iter().map(|&k| k as usize).max().unwrap_or(i);
     let end = owned.clone().map(sees).max().map_or(owned.end, |last| (last + 1).clamp(owned.end, exact.end));
     let members = |i: usize| !body.is_frame[i];
-    let beyond = (owned.end..end).filter(|&i| members(i));
+    // And those before this part that do not see its own, who would name them.
+    let sees = |from: u32, other: usize| neighbours.of(from as usize).contains(&(other as u32));
+    let before = owned.clone().flat_map(|i| neighbours.of(i).iter().filter(move |&&k| !sees(k, i)));
+    let before: BTreeSet<usize> =
+        before.map(|&k| k as usize).filter(|k| (exact.start..owned.start).contains(k)).collect();
+    let beyond = before.into_iter().chain(owned.end..end).filter(|&i| members(i));
     let own = owned.clone().filter(|&i| members(i));
     let pieces = Pieces::among(team, &sets.labels(), |i| body.index(i), own, beyond);
     match pieces.firsts[..] {

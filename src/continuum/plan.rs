@@ -8,7 +8,7 @@ use super::damping::along_outline;
 use super::layout::Layout;
 use super::layout::refusals::refuse_pieces;
 use super::layout::regions::no_particle;
-use super::layout::roles::{ReferenceMotion, held_components};
+use super::layout::roles::{ReferenceMotion, held_components, require_free_components};
 use super::parts::{Parting, agreed, averages_dilatations};
 use super::pieces::require_connected;
 use super::{places, weights};
@@ -106,6 +106,7 @@ impl Plan {
         for (k, change) in changes.iter().enumerate() {
             is_anywhere(change.particles.iter().any(|i| owned.contains(i)), format!("roles[{k}]"))?;
         }
+        require_free_components(scene, &changes, &layout.body, Some(team))?;
         require_loaded(scene, &layout, team)?;
         for (k, changed) in followed(scene) {
             require_loaded(changed, &layout, team).map_err(|error| refuse_keys(scene, k, &error))?;

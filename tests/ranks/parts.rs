@@ -233,6 +233,8 @@ fn a_body_laid_out_in_parts_has_the_bits_of_one_laid_out_as_a_whole() {
         ("distance-weights", &[]),
         ("lattice-honeycomb", &[]),
         ("lattice-hexagonal", &[]),
+        // Neighbours that are looked at from one side, on the side of the ranks before.
+        ("tension", &["frame=none", "neighbours={kind=\"offsets\",offsets=[[-1,0],[0,1],[0,-1]]}"]),
     ] {
         assert_parted_the_same(name, &[&small[..], more].concat(), 25);
     }
@@ -523,6 +525,8 @@ fn a_material_in_parts_is_refused_for_what_it_is_refused_for_as_a_whole() {
     let at =
         |role: &str| format!("roles=[{{region={{kind=\"edge\",side=\"left\"}},role=\"clamped\"{role}}}]");
     let one = "roles=[{region={kind=\"ids\",ids=[100]},role=\"clamped\"}]";
+    let within = "roles=[{region={kind=\"box\",min=[0,0],max=[9,9]},role=\"clamped\"},\
+        {region={kind=\"box\",min=[0,0],max=[8,8]},role=\"clamped\",axis=\"y\"}]";
     let paper = ["rule.mean.kind=\"barycentre\"", "neighbours={kind=\"second\"}"];
     let fitted = |body: &str| format!("body={{outline=\"fitted\",{body}}}");
     let thin = fitted("shape={kind=\"rectangle\",max=[18,0.5]}");
@@ -551,6 +555,7 @@ fn a_material_in_parts_is_refused_for_what_it_is_refused_for_as_a_whole() {
         ("no chain of cells", &[apart, far]),
         ("are not connected", &[apart]),
         ("is outside the body", &["record={places=[[12.0,8.0],[8.4,4.3]]}"]),
+        ("roles[0] holds these particles altogether", &[&within]),
     ] {
         assert_refused_the_same(&plate(PLATE, &[&["record.probes=[]"], sets].concat()), what);
     }

@@ -209,6 +209,16 @@ fn what_a_growing_load_does_to_a_body_in_parts_is_what_it_does_to_one_alone() {
     }
 }
 
+#[test]
+fn what_is_said_of_components_that_stay_in_parts_is_what_is_said_alone() {
+    let roles = "roles=[{region={kind=\"box\",min=[0.0,0.0],max=[9.0,9.0]},role=\"clamped\"},\
+        {region={kind=\"edge\",side=\"bottom\"},role=\"leader\",axis=\"y\",motion={kind=\"velocity\",per_step=[0.0,0.001]}}]";
+    let text = "title=\"a plate\"\nlattice={kind=\"square\",spacing=1.0}\nbody={shape={kind=\"grid\",columns=21,rows=7}}\n\
+        material={kind=\"isotropic\",young=1000.0,poisson=0.3}\nrule={mean={kind=\"material\"}}\nstop={steps=8}\nrecord={vtk_every=4}\nroles=[]";
+    let [_, _, summary] = assert_tables_the_same(&plate(text, &[roles]));
+    assert!(summary.contains("leads one component of 21 particles, but 10 of these stay"), "{summary}");
+}
+
 /// What stands in a file of VTK of each of its particles, by their ids, and of each of its cells, by their kind and the ids of
 /// their corners: bits of each array.
 #[derive(Default)]

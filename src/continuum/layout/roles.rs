@@ -9,6 +9,7 @@ use crate::flock::motion::Motion;
 use crate::flock::role::Role;
 use crate::flock::rules::Axis;
 use crate::flock::vectors::Vectors;
+use crate::ranks::Team;
 use crate::scene::{LeaderMotion, RoleEntry, Scene, SceneError};
 use crate::solve::linear::HeldComponent;
 
@@ -35,7 +36,7 @@ impl Layout {
         let changes = scene.roles.iter().enumerate().map(change).collect::<Result<Vec<_>, SceneError>>()?;
         // A part of a body may have just the corner that two regions share.
         if self.body.part.is_none() {
-            require_free_components(scene, &changes, self.body.count())?;
+            require_free_components(scene, &changes, &self.body, None)?;
         }
         Ok(changes)
     }
@@ -70,49 +71,75 @@ impl Layout {
     }
 }
 
-/// The entries that hold or lead one component from the start, by number, and of each of their particles the entry above
-/// that holds it altogether.
-fn covered(changes: &[RoleChange], count: usize) -> Vec<(usize, Vec<Option<usize>>)> {
-    let mut holder = vec![None; count];
-    let mut covered = Vec::new();
-    for (k, change) in changes.iter().enumerate().filter(|(_, change)| change.is_at_once()) {
-        if change.axis.is_some() {
-            covered.push((k, change.particles.iter().map(|&i| holder[i]).collect()));
-        } else {
-            let holds = change.role != Role::Follower;
-            change.particles.iter().for_each(|&i| holder[i] = holds.then_some(k));
-        }
-    }
-    covered
+/// The particles of an entry that holds or leads one component from the start.
+struct Covered {
+    entry: usize,
+    /// Those that no entry above holds altogether.
+    free: u64,
+    /// Those that an entry above does, by its number; none is left out.
+    held: Vec<(usize, u64)>,
 }
 
-/// Refuses single components of particles all of which an entry above holds altogether: nothing would be left of them.
-fn require_free_components(scene: &Scene, changes: &[RoleChange], count: usize) -> Result<(), SceneError> {
-    for (k, held) in covered(changes, count) {
-        let held: Option<Vec<usize>> = held.into_iter().collect();
-        if let Some([first, others @ ..]) = held.as_deref() {
-            let hold = if others.iter().all(|by| by == first) { "holds" } else { "and others above hold" };
+/// Found by all ranks together where each has a part of the body.
+fn covered(changes: &[RoleChange], body: &Body, team: Option<&Team>) -> Vec<Covered> {
+    let mut holder = vec![None; body.count()];
+    let (mut entries, mut counts) = (Vec::new(), Vec::new());
+    for (k, change) in changes.iter().enumerate().filter(|(_, change)| change.is_at_once()) {
+        if change.axis.is_none() {
+            let holds = change.role != Role::Follower;
+            change.particles.iter().for_each(|&i| holder[i] = holds.then_some(k));
+            continue;
+        }
+        // By the entry above, and last those of none.
+        let mut own = vec![0; changes.len() + 1];
+        let particles = change.particles.iter().filter(|i| body.owned().contains(i));
+        particles.for_each(|&i| own[holder[i].unwrap_or(changes.len())] += 1);
+        entries.push(k);
+        counts.push(own);
+    }
+    let own = counts.concat();
+    let all = team.map_or(own.clone(), |team| team.gather_all(&own));
+    let count = |n: usize| all.iter().skip(n).step_by(own.len()).sum::<u64>();
+    let covered = |(n, entry): (usize, usize)| {
+        let count = |above: usize| count(n * (changes.len() + 1) + above);
+        let held = (0..changes.len()).map(|above| (above, count(above))).filter(|(_, held)| *held > 0);
+        Covered { entry, free: count(changes.len()), held: held.collect() }
+    };
+    entries.into_iter().enumerate().map(covered).collect()
+}
+
+/// Refuses single components of particles all of which an entry above holds altogether: nothing would be left of them. On all
+/// ranks alike, where each has a part of the body.
+pub fn require_free_components(
+    scene: &Scene,
+    changes: &[RoleChange],
+    body: &Body,
+    team: Option<&Team>,
+) -> Result<(), SceneError> {
+    for Covered { entry, free, held } in covered(changes, body, team) {
+        if let (0, Some(((first, _), others))) = (free, held.split_first()) {
+            let hold = if others.is_empty() { "holds" } else { "and others above hold" };
             let message = format!("is without effect: roles[{first}] {hold} these particles altogether");
             let help = "leave it out, or take its particles out of the other region";
-            return Err(scene.refuse(&format!("roles[{k}].axis"), message, help));
+            return Err(scene.refuse(&format!("roles[{entry}].axis"), message, help));
         }
     }
     Ok(())
 }
 
 /// A warning for each entry that leads one component of particles some of which an entry above holds altogether.
-pub fn cautions(changes: &[RoleChange], count: usize) -> Vec<String> {
-    let leads = |(k, _): &(usize, Vec<Option<usize>>)| changes[*k].role == Role::Leader;
-    let caution = |(k, held): (usize, Vec<Option<usize>>)| {
-        let first = held.iter().flatten().next()?;
-        let stay = held.iter().flatten().count();
+pub fn cautions(changes: &[RoleChange], body: &Body, team: Option<&Team>) -> Vec<String> {
+    let leads = |of: &Covered| changes[of.entry].role == Role::Leader;
+    let caution = |Covered { entry, free, held }: Covered| {
+        let (first, _) = held.first()?;
+        let stay: u64 = held.iter().map(|(_, held)| held).sum();
         Some(format!(
-            "roles[{k}] leads one component of {} particles, but {stay} of these stay as roles[{first}] has them, which holds them \
+            "roles[{entry}] leads one component of {} particles, but {stay} of these stay as roles[{first}] has them, which holds them \
              altogether; take them out of its region to have them led",
-            held.len()
+            free + stay
         ))
     };
-    covered(changes, count).into_iter().filter(leads).filter_map(caution).collect()
+    covered(changes, body, team).into_iter().filter(leads).filter_map(caution).collect()
 }
 
 /// Displacement \[length\] of each particle that does not follow, at `step`; `None` for followers and for leaders
