@@ -16,6 +16,10 @@ const ROBOTS: usize = 8;
 
 /// Robots on a circle that all lead.
 fn circle(model: &str) -> Swarm {
+    circle_with(model, &[])
+}
+
+fn circle_with(model: &str, sets: &[String]) -> Swarm {
     let place = |k: usize| {
         let angle = k as f64 / ROBOTS as f64 * std::f64::consts::TAU;
         format!("{{ name = \"r{k}\", place = [{:?}, {:?}] }}", 2.5 * angle.cos(), 2.5 * angle.sin())
@@ -28,7 +32,7 @@ fn circle(model: &str) -> Swarm {
         (0..ROBOTS).map(place).collect::<Vec<_>>().join(", "),
         names.join(", ")
     );
-    parse(&text).expect("a swarm")
+    Swarm::parse("circle", "circle.toml", &text, sets, None).expect("a swarm")
 }
 
 /// One loop for all robots, or one for each.
@@ -106,6 +110,51 @@ fn swarms_with_late_poses_fly_as_others_do() {
         let (_, report) = flown(&load_swarm(swarm, &[&format!("flight.delay={delay}"), model]));
         let [largest, last] = report.formation_error.expect("measured");
         assert!(largest < most && last < 1e-6, "{swarm}: {largest} m, {last} m");
+    }
+}
+
+/// A robot that moves just when its next target comes has none, one or two of them between two poses, by chance.
+#[test]
+fn a_robot_in_step_with_its_loop_is_led_at_its_pace() {
+    for (phase, shake) in
+        [(0.02, 0.0), (0.08, 0.0), (0.002, 0.006), (0.002, 0.02), (0.098, 0.006), (0.05, 0.04)]
+    {
+        let swarm = circle_with("integrator\"", &["limits.acceleration=1.0".to_owned()]);
+        let mut control = Control::new(&swarm).expect("laid out");
+        let mut random = Pcg64Mcg::seed_from_u64(1);
+        let places: Vec<[f64; 2]> = control.formation().places.iter().collect();
+        let (mut here, mut moved, mut sent) = (places[0], 0.0, vec![places[0]; 3]);
+        let mut steps =
+            (0..).map(|k| PERIOD * (f64::from(k) - 1.0) + phase + random.random_range(-1.0..1.0) * shake);
+        let mut next = steps.next().expect("endless");
+        let (mut strong, mut back) = (0, 0);
+        for tick in 0..150 {
+            let now = f64::from(tick) * PERIOD;
+            while next <= now {
+                // It goes on to its last target at its own pace.
+                let (goal, way) =
+                    (*sent.last().expect("there"), distance(here, *sent.last().expect("there")));
+                let share = if way > 0.0 { ((next - moved) / way).clamp(0.0, 1.0) } else { 0.0 };
+                here = [0, 1].map(|axis| here[axis] + share * (goal[axis] - here[axis]));
+                let pose = Pose { position: here, yaw: 0.0, stamp: next, frame_is_right: true };
+                control.receive(0, pose, now).expect("a pose");
+                (moved, next) = (next, steps.next().expect("endless"));
+            }
+            for (k, &position) in places.iter().enumerate().skip(1) {
+                let pose = Pose { position, yaw: 0.0, stamp: now, frame_is_right: true };
+                control.receive(k, pose, now).expect("a pose");
+            }
+            // Half as fast as it may go, after it was heard.
+            let lead = [2.5, (0.5 * (now - 1.0)).clamp(0.0, 6.0)];
+            assert!(control.place_leader(0, lead));
+            control.tick(now);
+            sent.push(control.target(0).unwrap_or(here));
+            let [c, b, a] = [1, 2, 3].map(|k| sent[sent.len() - k]);
+            strong += usize::from((c[1] - 2.0 * b[1] + a[1]).abs() > 1.5 * PERIOD * PERIOD);
+            back += usize::from(c[1] < b[1] - 1e-3);
+        }
+        assert!(strong < 5 && back == 0, "{phase}, {shake}: {strong} too strong, {back} back");
+        assert!(distance(here, [2.5, 6.0]) < 0.1, "{phase}, {shake}: {here:?}");
     }
 }
 

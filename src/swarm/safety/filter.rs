@@ -213,7 +213,9 @@ impl Filter {
         let ahead = self.ahead(seen, member);
         // One that has not come so far, or was carried away, is given its way from where it is seen.
         let goes_on = ahead > 0.0 && distance(here, last) <= self.limits.speed * (period + ahead);
-        let has_arrived = self.limits.arrives && seen.known[member] && self.is_inexact(seen, period, member);
+        let is_there = self.limits.deviation > 0.0 || self.is_near(seen, last, period, member);
+        let has_arrived =
+            self.limits.arrives && seen.known[member] && is_there && self.is_inexact(seen, period, member);
         let is_elsewhere = goes_on || has_arrived;
         if !is_elsewhere || !last.iter().all(|x| x.is_finite()) {
             return target;
@@ -243,9 +245,17 @@ impl Filter {
         if goes_on && seen.known[member] { seen.ages[member].max(0.0) } else { 0.0 }
     }
 
-    /// Whether a member's pose does not say where it is: late, or noisy.
+    /// Whether a member's pose does not say where it is: noisy, or of a time at which it need not have come to its last target yet,
+    /// which it was given a period ago. Two such poses have none, one or two targets between them, as it happens.
     pub(super) fn is_inexact(&self, seen: &Seen, period: f64, member: usize) -> bool {
-        seen.ages[member] > (1.0 - TOUCHING) * period || self.limits.deviation > 0.0
+        seen.ages[member] > TOUCHING * period || self.limits.deviation > 0.0
+    }
+
+    /// Whether a member can have come from where it is seen to its last target: one that cannot was carried away, or not sent
+    /// anywhere for a while, and is where it is seen.
+    pub(super) fn is_near(&self, seen: &Seen, last: [f64; 2], period: f64, member: usize) -> bool {
+        let reach = self.limits.speed * (period + seen.ages[member].max(0.0)) + self.limits.margin();
+        distance(seen.present.get(member), last) <= reach
     }
 
     /// Sorts the members for the queries to come.
