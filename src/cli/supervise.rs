@@ -21,7 +21,7 @@ use flockform::ros::edge::pulse::{MIDDLEWARE_GONE, longest_silence};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::interrupt;
+use super::{BAD_INPUT, interrupt};
 
 /// Number of a child, from 1, in the environment.
 const LIFE: &str = "FLOCKFORM_LIFE";
@@ -64,19 +64,22 @@ pub fn supervise(security: &Security) -> std::io::Result<Result<Life, ExitCode>>
 fn lead(silence: Duration) -> std::io::Result<ExitCode> {
     let stop = interrupt::serves();
     let (mut state, mut speechless, mut rest) = (b"null\n".to_vec(), 0, Duration::ZERO);
+    let (mut has_run, mut given_up_with) = (false, MIDDLEWARE_GONE);
     for number in 1_u32.. {
         let begun = Instant::now();
         let (mut child, lines) = start(number, &state)?;
         let (code, last) = follow(&mut child, lines, silence, stop)?;
         speechless = if last.is_some() { 0 } else { speechless + 1 };
+        has_run |= last.is_some();
         state = last.unwrap_or(state);
         match code {
-            // Done, interrupted, or refused: another would do the same.
-            Some(code @ 0..=2) => return Ok(ExitCode::from(code)),
+            // Done, interrupted, or refused: another would do the same. What was taken before is refused for what may pass.
+            Some(code @ 0..=2) if code != BAD_INPUT || !has_run => return Ok(ExitCode::from(code)),
             _ if stop.load(Ordering::Relaxed) => return Ok(ExitCode::SUCCESS),
             _ if speechless
                 >= if matches!(code, None | Some(MIDDLEWARE_GONE)) { ENDED } else { SPEECHLESS } =>
             {
+                given_up_with = code.filter(|&code| code == BAD_INPUT).unwrap_or(MIDDLEWARE_GONE);
                 break;
             }
             _ => {}
@@ -95,7 +98,7 @@ fn lead(silence: Duration) -> std::io::Result<ExitCode> {
         std::thread::sleep(rest);
     }
     tracing::error!("one process after the other ended before it had begun");
-    Ok(ExitCode::from(MIDDLEWARE_GONE))
+    Ok(ExitCode::from(given_up_with))
 }
 
 /// Starts a child and sends it the state.

@@ -50,9 +50,11 @@ pub(super) fn declare(
     is_configured: &Arc<AtomicBool>,
 ) -> Result<(Settings, Store), NodeError> {
     let limits = control.limits();
+    // Slower, and every pose would be too old before the next period.
+    let slowest = (1.0 / control.watch().limits().age_limit).max(1.0).min(1.0 / control.period());
     let mut raw = swarm.raw.node.clone();
     let mut declarations = vec![
-        Declaration::new("rate", 1.0 / control.period()).range(1.0..=500.0).describe("targets a second [Hz]"),
+        Declaration::new("rate", 1.0 / control.period()).range(slowest..=500.0).describe("targets a second [Hz]"),
         Declaration::new("state_rate", 10.0)
             .range(0.1..=100.0)
             .describe("formation states and markers a second, at most one a target [Hz]"),
