@@ -5,7 +5,7 @@
 use super::figures::axes::Axes;
 use super::figures::{Formats, MOST_DOTS, PNG_ZOOM, components, page, panels};
 use super::report::recorder::{Packed, packed};
-use crate::continuum::memory::{measured, solving, stepped};
+use crate::continuum::memory::{measured, on_the_way, solving, stepped};
 use crate::continuum::plan::Plan;
 use crate::material::cells::Cells;
 use crate::material::stress::StressState;
@@ -64,7 +64,7 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
         false => 0,
     };
     let most = [stepping, packing, tables, drawing].into_iter().max().unwrap_or(0);
-    program + RUNNING + stepped(plan) + snapshots + most
+    program + RUNNING + stepped(plan) + on_the_way(scene, plan) + snapshots + most
 }
 
 /// Bytes of the places to which a body is taken back whose step diverges, or whose steps at once came to rest on the way.
@@ -87,7 +87,14 @@ pub fn of_part(scene: &Scene, plan: &Plan, (ranks, report): (usize, bool), progr
     let stepping = ON_THE_WAY * halo + taken_back(scene, plan);
     let most = measured(plan).max(stepping).max(solving(scene, plan));
     let shown = values.max(packing) + frames[0];
-    program + RUNNING + stepped(plan) + each + of_rank * ranks.min(ON_A_MACHINE) + most + shown
+    program
+        + RUNNING
+        + stepped(plan)
+        + on_the_way(scene, plan)
+        + each
+        + of_rank * ranks.min(ON_A_MACHINE)
+        + most
+        + shown
 }
 
 /// Bytes of what the figures of so many steps are while they are drawn, as many at once as there are threads.

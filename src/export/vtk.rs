@@ -19,7 +19,7 @@
 //! base64 within the XML: a number costs 11 bytes, loses nothing, and the file stays well-formed, which raw appended
 //! data would not.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::ops::Range;
@@ -97,7 +97,21 @@ impl VtkSeries {
             }
             series.frames.push(frame);
         }
+        series.remove_others()?;
         Ok(series)
+    }
+
+    /// Removes frames that are none of the series: of the step at which an earlier run was interrupted.
+    fn remove_others(&self) -> Result<(), ExportError> {
+        let kept: HashSet<PathBuf> = self.paths(&self.frames).into_iter().collect();
+        let steps = self.files.path(Path::new(FOLDER));
+        let listed = fs::read_dir(&steps).map_err(ExportError::io("read", &steps))?;
+        for path in
+            listed.flatten().map(|entry| entry.path()).filter(|path| is_frame(path) && !kept.contains(path))
+        {
+            fs::remove_file(&path).map_err(ExportError::io("remove", &path))?;
+        }
+        Ok(())
     }
 
     /// The present paths of some frames: a folder may take another name while it is filled.
@@ -156,6 +170,12 @@ impl VtkSeries {
         write_file(&collection, text)?;
         Ok(std::iter::once(collection).chain(self.paths(&self.frames)).collect())
     }
+}
+
+/// Whether a file has a name that a frame, or a piece of one, has.
+fn is_frame(path: &Path) -> bool {
+    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    name.starts_with("step_") && (name.ends_with(".vtu") || name.ends_with(".pvtu"))
 }
 
 /// The files of a frame, below the folder of outputs.

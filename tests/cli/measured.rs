@@ -443,6 +443,18 @@ fn work_done_on_the_way_is_the_energy_that_a_body_bent_far_stores() {
         |parts: &str| bundled("elastica", &[far[0], far[1], &format!("load_steps={{schedule={parts}}}")]).1;
     assert!(unloaded("[0.2, 1.0, 0.0]").contains("and to zero in a body that gives it back"));
     assert!(!unloaded("[0.2, 1.0, 0.2, 0.0]").contains("the work done on the way, summed up"));
+    // Carried about without a strain there is nothing to give back.
+    let turned = |side: &str| {
+        format!(
+            "{{ region = {{ kind = \"edge\", side = \"{side}\" }}, role = \"leader\", \
+             motion = {{ kind = \"affine\", about = [0.0, 0.0], rotate = 90.0, steps = 4 }} }}"
+        )
+    };
+    let roles = format!("roles=[{}, {}]", turned("left"), turned("right"));
+    let (folder, said) =
+        bundled("elastica", &["loads=[]", &roles, "load_steps={increments=4}", "stop.steps=4"]);
+    let measured = summary(folder.path())["mechanics"].clone();
+    assert!(number(&measured["largest_turn"]) > 1.57 && !said.contains("caution"), "{said}");
 }
 
 #[test]
