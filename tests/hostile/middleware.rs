@@ -374,6 +374,30 @@ fn a_program_whose_file_is_removed_or_replaced_goes_on_when_its_worker_dies() {
     assert_eq!(node.terminate(), Some(0));
 }
 
+#[test]
+fn what_is_refused_for_a_moment_after_a_program_has_run_does_not_end_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("pair.toml");
+    let text = "title = \"pair\"\nradius = 0.2\nrobots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [2.0, 0.0] }]\n\
+        links = { kind = \"nearest\", count = 1 }\nleaders = [{ robots = [\"a\"], program = { kind = \"external\" } }]\n\
+        limits = { speed = 1.0 }\n";
+    std::fs::write(&file, text).expect("written");
+    let mut node = Running::start(&mut command(domain(), &["node", file.to_str().expect("a path")]));
+    let lines = node.lines();
+    let says = |words: &str| until(words, || lines.try_iter().find(|line| line.contains(words)));
+    says("2 robots at");
+    // It has said so to the process that starts others.
+    std::thread::sleep(Duration::from_secs(1));
+    let worker = until("a worker", || node.worker());
+    let away = folder.path().join("away.toml");
+    std::fs::rename(&file, &away).expect("moved");
+    signal("KILL", worker);
+    says("ended with code 2");
+    std::fs::rename(&away, &file).expect("moved back");
+    says("2 robots at");
+    assert_eq!(node.terminate(), Some(0));
+}
+
 /// Takes seconds from `FLOCKFORM_ATTACK_SECONDS`.
 #[test]
 #[ignore = "takes a minute; half an hour with FLOCKFORM_ATTACK_SECONDS=1800"]
