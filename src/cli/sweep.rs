@@ -135,9 +135,14 @@ impl Sweep {
         if request.outputs.is_empty() {
             request.outputs = Output::usual(&scene);
         }
-        let design = request.design()?;
+        let arguments = scene_arguments(&request);
+        let is_whole = |key: &str, start: f64| {
+            let scene = arguments.load_scene(&[format!("{key}={start}")]);
+            scene.is_ok_and(|scene| scene.takes_whole_numbers(key))
+        };
+        let design = request.design()?.in_whole_numbers(is_whole);
         let rows = rows.into_iter().map(|row| (row.run, row)).collect();
-        let plan_digest = runs::first_digest(&scene_arguments(&request), &design);
+        let plan_digest = runs::first_digest(&arguments, &design);
         Ok(Self { begun: JournalHeader::new(request, &scene, plan_digest), scene, design, rows })
     }
 

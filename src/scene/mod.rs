@@ -40,6 +40,7 @@ use crate::sweep::Update;
 
 pub use bundled::{Bundled, bundled};
 pub use document::Document;
+use document::find;
 pub use document::problem::{Place, Problem, SceneError};
 use raw::RawScene;
 pub use validate::actions::{MOST_ACTIONS, is_changeable};
@@ -153,6 +154,12 @@ impl Scene {
             Some(LoadSteps::Solved(parts)) => parts.len(),
             _ => self.stop.steps,
         }
+    }
+
+    /// Whether a key that is given takes whole numbers alone.
+    pub fn takes_whole_numbers(&self, key: &str) -> bool {
+        let raw = serde_json::to_value(&self.raw).unwrap_or_default();
+        find(&raw, key).is_some_and(|value| value.is_u64() || value.is_i64())
     }
 
     /// Whether its equilibrium is solved for without states in between.

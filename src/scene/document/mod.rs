@@ -14,6 +14,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue, Error};
 
 use overrides::Segment;
+pub(crate) use overrides::find;
 use problem::{Place, Problem, SceneError};
 
 /// Tables and lists may nest this deep, so that recursion over a document cannot exhaust the stack.

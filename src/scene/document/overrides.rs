@@ -51,6 +51,14 @@ pub(crate) fn split_assignment(text: &str) -> Option<(&str, &str)> {
     Some((text[..at].trim(), text[at + 1..].trim()))
 }
 
+/// The value at a path, as a document that was read has it.
+pub(crate) fn find<'a>(value: &'a serde_json::Value, path: &str) -> Option<&'a serde_json::Value> {
+    parse_path(path).ok()?.iter().try_fold(value, |value, segment| match segment {
+        Segment::Key(key) if value.is_object() => value.get(key),
+        segment => value.get(segment.index()?),
+    })
+}
+
 /// Reads a path such as `roles\[1\].motion`, `roles.1.motion` or `names."a.b"`.
 pub(crate) fn parse_path(path: &str) -> Result<Vec<Segment>, String> {
     let mut segments = Vec::new();

@@ -19,6 +19,11 @@ impl Level {
         Self { text: text.to_owned(), number: finite(text) }
     }
 
+    /// The same, or the nearest whole number.
+    pub(super) fn rounded(&self) -> Self {
+        self.number.map_or_else(|| self.clone(), |number| Self::of(number.round()))
+    }
+
     /// The shortest text that reads back as the number; a whole one is written as an integer, which keys of both kinds
     /// take.
     fn of(number: f64) -> Self {
@@ -145,6 +150,14 @@ impl Factor {
                 let last = count.saturating_sub(1).max(1) as f64;
                 (0..count).map(|n| Level::of(grid_point(*ends, n as f64, last, self.is_log))).collect()
             }
+        }
+    }
+
+    /// Where the range begins, if it goes from one whole number to another.
+    pub(super) fn whole_start(&self) -> Option<f64> {
+        match self.values {
+            Values::Range { ends, .. } => ends.iter().all(|end| end.fract() == 0.0).then_some(ends[0]),
+            Values::List(_) => None,
         }
     }
 

@@ -125,6 +125,17 @@ impl Design {
         Ok(Self { runs: (0..samples).map(run).collect(), factors })
     }
 
+    /// The same with whole numbers alone for keys of which `is_whole` says that they take no others, with where their range begins.
+    #[must_use]
+    pub fn in_whole_numbers(mut self, is_whole: impl Fn(&str, f64) -> bool) -> Self {
+        for (k, factor) in self.factors.iter().enumerate() {
+            if factor.whole_start().is_some_and(|start| is_whole(&factor.key, start)) {
+                self.runs.iter_mut().for_each(|run| run[k] = run[k].rounded());
+            }
+        }
+        self
+    }
+
     /// The overrides of a run.
     pub fn overrides(&self, number: usize) -> Vec<String> {
         let of = |(factor, level): (&Factor, &Level)| format!("{}={}", factor.key, level.text);
@@ -228,6 +239,21 @@ mod tests {
             assert!((value / expected - 1.0).abs() < 1e-12, "{values:?}");
         }
         assert_eq!(column(&Design::grid(factors(&["k=2.5:9:1"])).unwrap(), 0), ["2.5"]);
+    }
+
+    #[test]
+    fn keys_that_take_whole_numbers_get_them() {
+        let whole = |key: &str, start: f64| key == "stop.steps" && start == 100.0;
+        let grid =
+            Design::grid(factors(&["stop.steps=100:200:4", "a=0:1:4"])).unwrap().in_whole_numbers(whole);
+        assert_eq!(grid.overrides(6), ["stop.steps=133", "a=0.6666666666666666"]);
+        let some = Design::sampled(factors(&["stop.steps=100:200"]), 9, Sampling::LatinHypercube, 0).unwrap();
+        let some = some.in_whole_numbers(whole);
+        assert!(column(&some, 0).iter().all(|text| (100..=200).contains(&text.parse::<i32>().unwrap())));
+        // A range between others is of a key that takes those.
+        let between =
+            Design::grid(factors(&["stop.steps=100:200.5:3"])).unwrap().in_whole_numbers(|_, _| true);
+        assert_eq!(column(&between, 0)[1], "150.25");
     }
 
     #[test]
