@@ -22,7 +22,7 @@ use crate::flock::role::Role;
 use crate::flock::rules::{Mean, Rotation};
 use crate::flock::strain::Strain;
 use crate::material::cells::Cells;
-use crate::material::elastic::{Constants, Elastic, Plane};
+use crate::material::elastic::{Constants, Plane};
 use crate::material::stress::StressState;
 use crate::scene::Scene;
 use crate::scene::units::Units;
@@ -245,7 +245,7 @@ impl RunRecorder {
                 STRAIN => take(values, &|i| engine.strain(i).map_or(f64::NAN, |strain| strain.largest())),
                 _ => {
                     let stress = stress();
-                    take(values, &|i| stress[i]);
+                    take(values, &|i| stress.get(i).copied().unwrap_or(f64::NAN));
                 }
             }
         }
@@ -419,10 +419,7 @@ fn animation(scene: &Scene, engine: &Engine, is_solved: bool) -> Animation {
         spacing: engine.body().lattice.spacing(),
         quantities,
         linear: is_linear(scene),
-        stress: engine
-            .cells()
-            .zip(engine.elastic())
-            .and_then(|(cells, elastic)| stress(scene, cells, elastic)),
+        stress: stress(scene, engine),
         ..Animation::default()
     }
 }
@@ -437,9 +434,13 @@ fn turns(scene: &Scene) -> bool {
     matches!(scene.mean, Mean::Material { rotation: Rotation::Corotated })
 }
 
-/// What the page computes stress of steps by; nothing for what it leaves out.
-fn stress(scene: &Scene, cells: &Cells, elastic: &Elastic) -> Option<Stress> {
-    if !cells.inclusions.is_empty() || cells.average_dilatations(elastic) {
+/// What the page computes stress of steps by; nothing for what it leaves out: several materials, at a time or one after the other,
+/// and cells that do not have their stress by themselves.
+fn stress(scene: &Scene, engine: &Engine) -> Option<Stress> {
+    let (cells, elastic) = (engine.cells()?, engine.elastic()?);
+    let steps = scene.actions.iter().map(|action| action.at).filter(|&at| at <= engine.step());
+    let is_changed = std::iter::once(0).chain(steps).any(|step| engine.elastic_at(step) != Some(elastic));
+    if is_changed || !cells.inclusions.is_empty() || cells.average_dilatations(elastic) {
         return None;
     }
     let unit = |k: usize| elastic.stress([0, 1, 2].map(|axis| f64::from(u8::from(axis == k))));
