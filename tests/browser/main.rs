@@ -304,6 +304,15 @@ fn stress_on_the_way_is_that_of_a_run_that_ends_there() {
         ("pulled", steps(40), steps(20), 20, vec!["lattice.kind=\"hexagonal\""]),
         ("pulled", steps(40), steps(20), 20, vec!["lattice.kind=\"honeycomb\""]),
         ("turned", steps(40), steps(20), 20, vec!["rule.mean.rotation=\"corotated\""]),
+        ("soft", steps(40), steps(20), 20, vec!["material.poisson=0.4995", "material.plane=\"strain\""]),
+        (
+            "stiffened",
+            steps(40),
+            steps(20),
+            20,
+            vec![r#"actions=[{at=30,what={kind="set",keys=["material.young=4000.0"]}}]"#],
+        ),
+        ("filled", steps(40), steps(20), 20, vec![FILLED]),
         ("torn", steps(40), steps(30), 30, vec!["rule.mean={kind=\"barycentre\"}", "fracture.stretch=1.2"]),
         ("elastica", increments("[0.2,0.5,1]"), increments("[0.2,0.5]"), 2, vec![]),
         ("inclusion", increments("[0.2,0.5,1]"), increments("[0.2,0.5]"), 2, vec![]),
@@ -334,6 +343,9 @@ fn stress_on_the_way_is_that_of_a_run_that_ends_there() {
         }
     }
 }
+
+/// With another material within.
+const FILLED: &str = r#"body.inclusions=[{shape={kind="disc",centre=[6,3],radius=2.1},material={kind="isotropic",young=9000.0,poisson=0.2}}]"#;
 
 /// A strip that is pulled and sheared step by step.
 const PULLED: &str = r#"

@@ -12,7 +12,7 @@ use crate::engine::Engine;
 use crate::export::figures::configuration::{Setting, configuration_in};
 use crate::export::figures::{Subject, displaced, page};
 use crate::export::report::RunRecorder;
-use crate::export::report::recorder::{PE1, PE2, STRAIN, VON_MISES};
+use crate::export::report::recorder::{PE1, PE2, STRAIN, VON_MISES, is_linear};
 use crate::flock::pseudo_energy::pe1_among;
 use crate::flock::strain::strain_among;
 use crate::flock::vectors::Vectors;
@@ -107,7 +107,10 @@ impl Shown<'_> {
     fn note(&self, subject: &Subject<'_>, frame: usize) -> String {
         let step = self.recorder.frames()[frame].step;
         let clock = match self.recorder.part_of_load(step) {
-            Some(part) => format!("{:.0} % of the load", 100.0 * part),
+            Some(part) => {
+                let of = if is_linear(self.scene) { "load" } else { "displacement" };
+                format!("{:.0} % of the {of}", 100.0 * part)
+            }
             None => format!("{} {step}", subject.counts),
         };
         page::note_at(&clock, self.broken(frame).len())

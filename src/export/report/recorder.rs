@@ -18,6 +18,7 @@ use crate::continuum::plan::Plan;
 use crate::continuum::run::Outcome;
 use crate::engine::Engine;
 use crate::engine::serde_impls;
+use crate::flock::action::ActionKind;
 use crate::flock::role::Role;
 use crate::flock::rules::{Mean, Rotation};
 use crate::flock::strain::Strain;
@@ -28,9 +29,9 @@ use crate::scene::Scene;
 use crate::scene::units::Units;
 
 /// Up to so many particles everything has the bits from which the strains of a body that turns far are still
-/// exact; larger bodies have those that a screen can show.
-const MOST_FINE: usize = 20_000;
-const FINE_BITS: u32 = 24;
+/// exact; larger bodies have those that a screen can show, and the page says what that makes of strains.
+const MOST_FINE: usize = 100_000;
+pub(super) const FINE_BITS: u32 = 24;
 const COARSE_BITS: u32 = 16;
 /// Of quantities that are shown as a colour only.
 const COLOUR_BITS: u32 = 12;
@@ -67,8 +68,8 @@ fn channels(scene: &Scene, total: usize, are_neighbours_known: bool, has_stresse
     if !are_neighbours_known {
         channels.extend([PE1, STRAIN].map(|name| channel(name, others)));
     }
-    // An increment costs more than its stress, a step less: of steps the page computes it.
-    let is_kept = !are_neighbours_known || scene.equilibrium.is_some();
+    // An increment costs more than its stress, a step less: of steps the page computes it, where it can.
+    let is_kept = !are_neighbours_known || scene.equilibrium.is_some() || stress(scene).is_none();
     channels.extend((has_stresses && is_kept).then(|| channel(VON_MISES, others)));
     channels
 }
@@ -130,6 +131,8 @@ pub struct RunRecorder {
     changes: Vec<[u32; 3]>,
     values: Vec<Vec<f64>>,
     is_solved: bool,
+    /// Whether stress on the way is recovered along the outline, which takes longer than a step.
+    is_recovered: bool,
     /// The particles that are shown of a body in parts.
     sample: Option<Sample>,
 }
@@ -145,7 +148,9 @@ impl RunRecorder {
         let values = vec![Vec::new(); channels.len()];
         let frames = Frames::new(count, channels);
         let first_roles = roles.clone();
-        Self { frames, first_roles, roles, changes: Vec::new(), values, is_solved: false, sample }
+        let is_recovered = sample.is_some() || scene.equilibrium.is_some();
+        let (changes, is_solved) = (Vec::new(), false);
+        Self { frames, first_roles, roles, changes, values, is_solved, is_recovered, sample }
     }
 
     /// The recorder, made if there is none yet; it goes on from the state of an earlier one that showed the same particles.
@@ -171,7 +176,11 @@ impl RunRecorder {
     /// Looks at a step.
     pub fn watch(&mut self, engine: &Engine) {
         if self.frames.wants(engine.step()) {
-            self.take(engine, 1.0, || von_mises(engine, 1.0));
+            let is_recovered = self.is_recovered;
+            self.take(engine, 1.0, || match is_recovered {
+                true => von_mises(engine, 1.0),
+                false => Stresses::von_mises_of_cells(engine),
+            });
             self.frames.keep(engine.step(), &slices(&self.values));
         }
     }
@@ -409,7 +418,7 @@ fn animation(scene: &Scene, engine: &Engine, is_solved: bool) -> Animation {
     }
     quantities.push(Quantity::new(STRAIN, "largest strain", ""));
     let clock = match is_solved {
-        true => Clock { quantity: "load", unit: "%" },
+        true => Clock { quantity: if is_linear(scene) { "load" } else { "displacement" }, unit: "%" },
         false => Clock { quantity: scene.counts(), unit: "" },
     };
     Animation {
@@ -419,13 +428,13 @@ fn animation(scene: &Scene, engine: &Engine, is_solved: bool) -> Animation {
         spacing: engine.body().lattice.spacing(),
         quantities,
         linear: is_linear(scene),
-        stress: stress(scene, engine),
+        stress: engine.cells().and_then(|_| stress(scene)),
         ..Animation::default()
     }
 }
 
 /// Whether displacements and stresses are as many times as large as their cause.
-fn is_linear(scene: &Scene) -> bool {
+pub(in crate::export) fn is_linear(scene: &Scene) -> bool {
     scene.material.is_some() && !turns(scene) && scene.fracture.is_none()
 }
 
@@ -434,13 +443,14 @@ fn turns(scene: &Scene) -> bool {
     matches!(scene.mean, Mean::Material { rotation: Rotation::Corotated })
 }
 
-/// What the page computes stress of steps by; nothing for what it leaves out: several materials, at a time or one after the other,
-/// and cells that do not have their stress by themselves.
-fn stress(scene: &Scene, engine: &Engine) -> Option<Stress> {
-    let (cells, elastic) = (engine.cells()?, engine.elastic()?);
-    let steps = scene.actions.iter().map(|action| action.at).filter(|&at| at <= engine.step());
-    let is_changed = std::iter::once(0).chain(steps).any(|step| engine.elastic_at(step) != Some(elastic));
-    if is_changed || !cells.inclusions.is_empty() || cells.average_dilatations(elastic) {
+/// What the page computes stress of steps by; nothing where there are several materials, at a time or one after the other, or cells
+/// do not have their stress by themselves.
+fn stress(scene: &Scene) -> Option<Stress> {
+    let elastic = scene.material?;
+    let stays = |then: &Scene| then.material == scene.material && then.inclusions == scene.inclusions;
+    let mut actions = scene.actions.iter();
+    let is_one = actions.all(|action| !matches!(&action.what, ActionKind::Follow(then) if !stays(then)));
+    if !is_one || !scene.inclusions.is_empty() || elastic.averaged_dilatation().is_some() {
         return None;
     }
     let unit = |k: usize| elastic.stress([0, 1, 2].map(|axis| f64::from(u8::from(axis == k))));

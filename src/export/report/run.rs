@@ -8,7 +8,7 @@ use super::super::load;
 use super::super::{OutputFolder, Results, Signed, Summary};
 use super::frames::MOST_FRAMES;
 use super::page::{Page, file_texts, number};
-use super::recorder::is_solved_at_once;
+use super::recorder::{FINE_BITS, is_solved_at_once};
 use super::sample::stride_of;
 use super::view::{Animation, View};
 use crate::continuum::run::{Outcome, StopReason};
@@ -103,6 +103,10 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
     note += &format!(
         " Displacements are kept to {bits} bits of each frame's range; {computed} are computed from them."
     );
+    let strain = largest_quantum(animation) / animation.spacing;
+    if bits < FINE_BITS {
+        note += &format!(" That leaves strains before the last frame uncertain by about {}.", number(strain));
+    }
     if animation.stress.is_some() && outcome.engine.free_edge().is_some() {
         note += " Stress before the last frame is the mean of each particle's cells, at the last recovered along the outline too, as in \
                  final.csv and films.";
@@ -113,6 +117,14 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
         " At the last frame the numbers are those of final.csv, to the last digit."
     };
     note
+}
+
+/// The coarsest step of a displacement in any frame \[length\].
+fn largest_quantum(animation: &Animation) -> f64 {
+    let channels = animation.channels.len().max(1);
+    let is_displacement = |n: usize| animation.channels[n % channels].name.starts_with('d');
+    let exponents = animation.exponents.iter().enumerate().filter(|(n, _)| is_displacement(*n));
+    exponents.map(|(_, &exponent)| f64::from(exponent).exp2()).fold(0.0, f64::max)
 }
 
 fn facts(scene: &Scene, outcome: &Outcome, summary: &Summary) -> Vec<(String, String)> {
