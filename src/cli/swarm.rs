@@ -80,7 +80,7 @@ pub struct SwarmArguments {
     film: SwarmFilmArguments,
     #[command(flatten)]
     record: RecordArguments,
-    /// Print the report as JSON, as in flight.json
+    /// Print the report as JSON
     #[arg(long, conflicts_with = "quiet")]
     json: bool,
 }

@@ -256,6 +256,12 @@ fn refuse_corotated(scene: &Scene, error: &CorotatedError) -> SceneError {
 fn refuse(scene: &Scene, error: &SolveError) -> SceneError {
     let is_auto = matches!(&scene.equilibrium, Some(asked) if matches!(asked.request.solver, Choice::Auto));
     let help = match (error, is_auto) {
+        (SolveError::DoubleOnly { .. }, _) => {
+            "use equilibrium.precision = \"f64\", or equilibrium.solver = \"conjugate-gradients\" or \"multigrid\""
+        }
+        (SolveError::SinglePrecision { .. }, _) => {
+            "use equilibrium.precision = \"f64\", or a larger equilibrium.tolerance"
+        }
         (SolveError::NotPositive { solver: Solver::Direct, .. }, _) => {
             "add supports, or bring the stiffnesses closer together"
         }

@@ -150,6 +150,23 @@ impl Layout {
         }
         Ok(Self { body, neighbours, cells, outline, partition, boundary, flat: None })
     }
+
+    /// Refuses an inclusion that has no cell: it would make no difference. `is_anywhere` is for all parts of a body, what one has.
+    pub(super) fn require_inclusions(
+        &self,
+        scene: &Scene,
+        is_anywhere: impl Fn(bool) -> bool,
+    ) -> Result<(), SceneError> {
+        for k in 0..scene.inclusions.len() {
+            let is_of = |cells: &Cells| (0..cells.count()).any(|cell| cells.region_of(cell) == k as u32 + 1);
+            if !is_anywhere(self.cells.as_ref().is_some_and(is_of)) {
+                let message = "no cell of the lattice has its middle in it";
+                let help = "use a smaller lattice.spacing, or leave it out";
+                return Err(scene.refuse(&format!("body.inclusions[{k}].shape"), message, help));
+            }
+        }
+        Ok(())
+    }
 }
 
 fn body_of(scene: &Scene) -> Result<(Body, Neighbours), BodyError> {

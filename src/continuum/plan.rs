@@ -83,6 +83,9 @@ impl Plan {
         reference: Option<ReferenceMotion<'_>>,
         lay_out: LayOut<'_>,
     ) -> Result<Self, SceneError> {
+        if layout.body.part.is_none() {
+            layout.require_inclusions(scene, |own| own)?;
+        }
         let changes = layout.role_changes(scene, reference)?;
         let mut plan = Self::of_roles(scene, layout, changes, lay_out)?;
         make_cuts(&mut plan.setup, scene, |_, _, found| found);
@@ -98,6 +101,7 @@ impl Plan {
         let layout = agreed(scene, team, parting.lay_out(scene, team.rank()))?;
         let connected = require_connected(&layout.body, &layout.neighbours, team);
         connected.map_err(|error| refuse_pieces(scene, &error))?;
+        layout.require_inclusions(scene, |own| team.any(own))?;
         let changes = agreed(scene, team, layout.role_changes(scene, None))?;
         let owned = layout.body.owned();
         let is_anywhere = |own: bool, key: String| {

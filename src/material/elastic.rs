@@ -209,7 +209,13 @@ impl Elastic {
 /// Von Mises stress \[force / length^2\] of xx, yy, xy and of zz.
 pub fn von_mises([xx, yy, xy]: [f64; 3], zz: f64) -> f64 {
     let (a, b, c) = (xx - yy, yy - zz, zz - xx);
-    (0.5 * (a * a + b * b + c * c) + 3.0 * xy * xy).sqrt()
+    let of = |a: f64, b: f64, c: f64, xy: f64| (0.5 * (a * a + b * b + c * c) + 3.0 * xy * xy).sqrt();
+    let largest = [a, b, c, xy].into_iter().fold(0.0, |most: f64, part| most.max(part.abs()));
+    // Squares of others vanish or overflow.
+    if largest == 0.0 || !largest.is_finite() || (1e-140..1e140).contains(&largest) {
+        return of(a, b, c, xy);
+    }
+    largest * of(a / largest, b / largest, c / largest, xy / largest)
 }
 
 fn positive(name: &'static str, value: f64) -> Result<(), ElasticError> {
@@ -274,6 +280,16 @@ mod tests {
 
     fn fibres(poisson_12: f64, angle: f64) -> Result<Elastic, ElasticError> {
         Elastic::new(Constants::Orthotropic { young: [9.0, 1.0], poisson_12, shear: 0.7, angle }, 1.0)
+    }
+
+    #[test]
+    fn von_mises_stress_has_the_scale_of_its_components() {
+        let expected = von_mises([3.0, -1.0, 0.5], 0.25);
+        for scale in [1e-300, 1e-170, 1e170, 1e300] {
+            let found = von_mises([3.0 * scale, -scale, 0.5 * scale], 0.25 * scale);
+            assert!((found / scale / expected - 1.0).abs() < 1e-12, "{scale:e}: {found:e}");
+        }
+        assert!(von_mises([f64::NAN, 1.0, 1.0], 0.0).is_nan() && von_mises([0.0; 3], 0.0) == 0.0);
     }
 
     #[test]

@@ -368,8 +368,13 @@ impl Corotated<'_> {
 
     /// The norm over the whole body.
     fn norm(&self, points: &Vectors) -> f64 {
+        let size = |i: usize| points.get(i).into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let largest = self.body.owned().map(size).fold(0.0, f64::max);
+        let largest = self.part.as_ref().map_or(largest, |part| part.team.largest([largest])[0]);
+        // In a unit of their size squares neither vanish nor overflow: a power of two, which keeps all bits.
+        let unit = if largest.is_normal() { largest.log2().floor().exp2() } else { 1.0 };
         let square = |i: usize| {
-            let [x, y] = points.get(i);
+            let [x, y] = points.get(i).map(|x| x / unit);
             (self.body.index_after_all(i), [x * x + y * y])
         };
         let own = self.body.owned().map(square);
@@ -377,7 +382,7 @@ impl Corotated<'_> {
             None => own.map(|(_, square)| square).fold([0.0], added),
             Some(part) => part.team.sum_in_order([0.0], own, self.body.has_some_after_all()),
         };
-        sum.sqrt()
+        unit * sum.sqrt()
     }
 
     /// Whether it is so on any rank.

@@ -297,7 +297,7 @@ fn the_stress_of_a_report_reaches_what_the_program_prints() {
 #[test]
 #[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
 fn stress_on_the_way_is_that_of_a_run_that_ends_there() {
-    let of_cells = ["--set", r#"body.shape={kind="grid",columns=13,rows=8}"#];
+    let of_cells = ["--set", r#"body.outline="lattice""#];
     let steps = |n: usize| format!("stop.steps={n}");
     let increments = |schedule: &str| format!("load_steps={{schedule={schedule}}}");
     for (name, way, end, at, sets) in [

@@ -458,6 +458,30 @@ fn work_done_on_the_way_is_the_energy_that_a_body_bent_far_stores() {
 }
 
 #[test]
+fn a_body_that_turns_is_the_same_in_any_unit() {
+    let in_units = |length: f64, stress: f64| {
+        let sets = [
+            format!("lattice.spacing={:e}", 0.25 * length),
+            format!("body.shape.max=[{:e},{length:e}]", 20.0 * length),
+            format!("material.thickness={length:e}"),
+            format!("material.young={:e}", 1000.0 * stress),
+            format!("loads[0].traction=[0.0,{:e}]", 2.0 * stress),
+            "record.places=[]".to_owned(),
+        ];
+        let (folder, _) = bundled("elastica", &sets.each_ref().map(String::as_str));
+        let summary = summary(folder.path());
+        let largest = number(&summary["mechanics"]["largest_von_mises"]["von_mises"]);
+        [number(&summary["energies"]["largest_strain"]), largest / stress]
+    };
+    let expected = in_units(1.0, 1.0);
+    for (length, stress) in [(1e-100, 1.0), (1e100, 1.0), (1.0, 1e-170), (1.0, 1e170)] {
+        let found = in_units(length, stress);
+        let are_near = (0..2).all(|k| (found[k] / expected[k] - 1.0).abs() < 1e-9);
+        assert!(are_near, "{length:e}, {stress:e}: {found:?}, {expected:?}");
+    }
+}
+
+#[test]
 fn a_schedule_that_ends_with_the_whole_load_ends_where_the_load_at_once_does() {
     let sets = ["rule.mean.rotation=corotated", "equilibrium.tolerance=1e-10"];
     let (at_once, _) = bundled("beam-loaded", &sets);

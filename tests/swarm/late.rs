@@ -159,6 +159,38 @@ fn a_robot_in_step_with_its_loop_is_led_at_its_pace() {
 }
 
 #[test]
+fn robots_that_turn_or_were_stuck_arrive_whatever_the_age_of_their_poses() {
+    let text = |model: &str, more: &str| {
+        format!(
+            "title = \"three\"\nradius = 0.2\nlinks = {{ kind = \"nearest\", count = 2 }}\n\
+             robots = [{{ name = \"a\", place = [0.0, 0.0] }}, {{ name = \"b\", place = [2.0, 0.0] }}, {{ name = \"c\", place = [1.0, 1.0] }}]\n\
+             leaders = [{{ robots = [\"a\", \"b\", \"c\"], program = {{ kind = \"path\", points = [{{ at = 2.0, displacement = [0.0, 0.0] }}, \
+             {{ at = 12.0, displacement = [-3.0, 4.0] }}] }} }}]\n\
+             limits = {{ speed = 1.0, acceleration = 1.0, clearance = 0.2 }}\nflight = {{ duration = 40.0, model = {{ {model} }}, {more} }}\n"
+        )
+    };
+    let flown = |model: &str, more: &str| {
+        let (record, _) = flown(&parse(&text(model, more)).expect("a swarm"));
+        let places = record.tracks.last().expect("recorded");
+        let starts = [[0.0, 0.0], [2.0, 0.0], [1.0, 1.0]];
+        let off = |k: usize| distance(places.get(k), [starts[k][0] - 3.0, starts[k][1] + 4.0]);
+        assert!((0..3).all(|k| off(k) < 0.01), "{model}, {more}: {places:?}");
+        record
+    };
+    for delay in 0..4 {
+        for turn_rate in [45.0, 90.0] {
+            let model = format!("kind = \"unicycle\", turn_rate = {turn_rate:?}");
+            flown(&model, &format!("delay = {delay}"));
+        }
+        let stuck = "faults = [{ robot = \"a\", at = 4.0, until = 5.9, what = { kind = \"stuck\" } }]";
+        let record = flown("kind = \"integrator\"", &format!("delay = {delay}, {stuck}"));
+        let heights: Vec<f64> = record.tracks.iter().map(|places| places.get(0)[1]).collect();
+        let falls = heights.windows(2).map(|pair| pair[0] - pair[1]).fold(0.0, f64::max);
+        assert!(falls < 1e-3, "{delay}: it went back by {falls} m in a period");
+    }
+}
+
+#[test]
 fn a_robot_that_was_carried_away_is_led_from_where_it_is() {
     const AGE: f64 = 0.03;
     let mut control = loops(&circle("ideal\""), false).remove(0);

@@ -115,7 +115,7 @@ pub struct RawEquilibrium {
     /// precision are then chosen, by what `flockform trade` has shown.
     #[serde(default)]
     pub accuracy: Option<RawAccuracy>,
-    /// Largest residual force over the load's at which the solver stops; 1e-8 unless an accuracy is given [1].
+    /// Largest residual force over the load's at which the solver stops, up to twice that once it is found again from the places; 1e-8 unless an accuracy is given [1].
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub tolerance: Option<f64>,

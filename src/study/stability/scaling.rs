@@ -5,11 +5,14 @@ use serde_json::{Map, Value};
 use crate::scene::Scene;
 
 /// Tables of a scene that hold lengths, or forces that go with them.
-const TABLES: [&str; 9] =
-    ["lattice", "body", "neighbours", "rule", "material", "loads", "roles", "fracture", "cuts"];
+const TABLES: [&str; 10] =
+    ["lattice", "body", "neighbours", "rule", "material", "loads", "roles", "fracture", "cuts", "record"];
+
+/// In place of a number beyond the doubles, to be refused as such.
+const BEYOND: &str = "1e999";
 
 /// Keys of lengths, wherever they stand.
-const LENGTHS: [&str; 20] = [
+const LENGTHS: [&str; 21] = [
     "between",
     "spacing",
     "a",
@@ -30,6 +33,7 @@ const LENGTHS: [&str; 20] = [
     "thickness",
     "scale",
     "to",
+    "places",
 ];
 
 /// Overrides that make the scene `factor` times as large: strains, stresses and angles stay, a force grows
@@ -82,7 +86,10 @@ fn power(table: &Map<String, Value>, name: &str, parent: &str) -> Option<i32> {
 
 fn times(value: &Value, by: f64) -> Value {
     match value {
-        Value::Number(number) => number.as_f64().map_or(Value::Null, |number| Value::from(by * number)),
+        Value::Number(number) => {
+            let product = number.as_f64().map(|number| by * number).filter(|product| product.is_finite());
+            product.map_or_else(|| BEYOND.into(), Value::from)
+        }
         Value::Array(items) => items.iter().map(|item| times(item, by)).collect(),
         other => other.clone(),
     }
@@ -101,8 +108,7 @@ pub fn toml(value: &Value) -> String {
         }
         // With an exponent, or TOML would take 1e300 written out for an integer.
         Value::Number(number) if number.is_f64() => format!("{:e}", number.as_f64().unwrap_or_default()),
-        // Beyond the doubles, and to be refused as such.
-        Value::Null => "1e999".into(),
+        Value::String(text) if text == BEYOND => BEYOND.into(),
         other => other.to_string(),
     }
 }

@@ -17,7 +17,8 @@ pub fn max_faulty(swarm: &Swarm, formation: &Formation) -> Result<usize, SceneEr
         return Ok(0);
     }
     formation.require_support(max_faulty).map_err(|unsupported| {
-        let help = "lower it, widen the neighbourhood, or make more robots leaders";
+        let help =
+            "lower it, or leave [resilience] out, widen the neighbourhood, or make more robots leaders";
         swarm.refuse("resilience.max_faulty_neighbours", unsupported, help)
     })?;
     if formation.affine(0.0).is_some() {

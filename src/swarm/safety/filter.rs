@@ -189,10 +189,10 @@ impl Filter {
         for (member, flags) in flags.iter_mut().enumerate() {
             let (target, mut changed) = self.target(seen, wanted.get(member), period, member);
             let target = self.within_speed(seen, target, period, member, &mut changed);
-            if seen.known[member] {
-                self.sent_before.set(member, self.sent.get(member));
-                self.sent.set(member, target);
-            }
+            // One that is sent nowhere may be anywhere when it is heard again.
+            let sent = if seen.known[member] { target } else { [f64::NAN; 2] };
+            self.sent_before.set(member, self.sent.get(member));
+            self.sent.set(member, sent);
             safe.set(member, target);
             *flags = changed;
         }
@@ -213,7 +213,10 @@ impl Filter {
         let ahead = self.ahead(seen, member);
         // One that has not come so far, or was carried away, is given its way from where it is seen.
         let goes_on = ahead > 0.0 && distance(here, last) <= self.limits.speed * (period + ahead);
-        let is_there = self.limits.deviation > 0.0 || self.is_near(seen, last, period, member);
+        // One that was carried away cannot have come from where it is seen to its last target.
+        let age = seen.ages[member].max(0.0);
+        let is_near = distance(here, last) <= self.limits.speed * (period + age);
+        let is_there = is_near || age > (1.0 - TOUCHING) * period || self.limits.deviation > 0.0;
         let has_arrived =
             self.limits.arrives && seen.known[member] && is_there && self.is_inexact(seen, period, member);
         let is_elsewhere = goes_on || has_arrived;
@@ -249,13 +252,6 @@ impl Filter {
     /// which it was given a period ago. Two such poses have none, one or two targets between them, as it happens.
     pub(super) fn is_inexact(&self, seen: &Seen, period: f64, member: usize) -> bool {
         seen.ages[member] > TOUCHING * period || self.limits.deviation > 0.0
-    }
-
-    /// Whether a member can have come from where it is seen to its last target: one that cannot was carried away, or not sent
-    /// anywhere for a while, and is where it is seen.
-    pub(super) fn is_near(&self, seen: &Seen, last: [f64; 2], period: f64, member: usize) -> bool {
-        let reach = self.limits.speed * (period + seen.ages[member].max(0.0)) + self.limits.margin();
-        distance(seen.present.get(member), last) <= reach
     }
 
     /// Sorts the members for the queries to come.

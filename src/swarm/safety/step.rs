@@ -121,8 +121,7 @@ impl Filter {
         let here = seen.present.get(member);
         let [last, before] = [&self.sent, &self.sent_before].map(|sent| sent.get(member));
         let is_known = last.iter().chain(&before).all(|x| x.is_finite());
-        let is_near = self.is_near(seen, last, period, member);
-        if self.brakes(seen) || !is_known || !is_near || !self.is_inexact(seen, period, member) {
+        if self.brakes(seen) || !is_known || !self.is_inexact(seen, period, member) {
             return Some(Motion { from: [0.0; 2], velocity });
         }
         let velocity = [0, 1].map(|k| (last[k] - before[k]) / period);

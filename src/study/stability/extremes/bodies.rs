@@ -1,7 +1,7 @@
 //! Degenerate bodies and leaders: coincident leaders, one follower, no leaders, far from the origin.
 
 use super::{AT_REST, Case, End, MATERIAL, OWN, Outcome, SHEET, patch, small, worst};
-use crate::flock::rules::Mean;
+use crate::flock::rules::{Mean, Rotation};
 use crate::flock::vectors::distance;
 use crate::scene::{Scene, SceneError};
 use crate::study::stability::scaling;
@@ -63,6 +63,10 @@ fn coincident(scene: &Scene) -> Result<Outcome, SceneError> {
     let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
     if let Mean::Spaced { .. } = scene.mean {
         return near(&overrides);
+    }
+    // Cells that are drawn into a point have no direction to be turned back by.
+    if let Mean::Material { rotation: Rotation::Corotated } = scene.mean {
+        return near(&[&overrides[..], &["stop.steps=200"]].concat());
     }
     collapsed(&[&overrides[..], &["stop={steps=20000,tolerance=1e-14}"]].concat())
 }
