@@ -135,6 +135,8 @@ struct End {
     reference: Vectors,
     present: Vectors,
     spacing: f64,
+    /// The error that the solver states where rounding keeps it from its tolerance \[1\].
+    known_to: f64,
 }
 
 impl End {
@@ -161,6 +163,7 @@ impl End {
             reference: Vectors::clone(&engine.body().reference),
             present: engine.present().clone(),
             spacing,
+            known_to: outcome.solved.as_ref().and_then(|solved| solved.known_to).unwrap_or(0.0),
         })
     }
 

@@ -59,5 +59,7 @@ fn scaled(
     } else {
         "the scene in its own unit does the same"
     };
-    Ok(Outcome::judged(base.apart_from(&end, factor, 1.0), 1e-9, check))
+    // As far as the solver itself says that it knows.
+    let within = f64::max(1e-9, 2.0 * end.known_to);
+    Ok(Outcome::judged(base.apart_from(&end, factor, 1.0), within, check))
 }
