@@ -60,7 +60,7 @@ fn off(threads: &str, scene: &str, sets: &[&str]) -> Vec<String> {
 
 #[test]
 fn plan_predicts_the_memory_of_a_run_within_a_tenth() {
-    let cases: [(&str, &[&str]); 8] = [
+    let cases: [(&str, &[&str]); 9] = [
         (
             "tension",
             &["body.shape.columns=400", "body.shape.rows=400", "stop.steps=60", "record.figures=[1,10,20]"],
@@ -70,6 +70,7 @@ fn plan_predicts_the_memory_of_a_run_within_a_tenth() {
         ("second-gradient", &["body.shape.columns=350", "body.shape.rows=350", "stop.steps=40"]),
         ("fracture", &["lattice.a=1.2", "lattice.b=1.3", "fracture.distance=2", "stop.steps=20"]),
         ("beam-loaded", &["lattice.spacing=0.03"]),
+        ("beam-loaded", &["lattice.spacing=0.04", "load_steps.increments=2"]),
         ("beam-hexagonal", &["lattice.spacing=0.03"]),
         ("plate-hole", &["lattice.spacing=0.05"]),
     ];
