@@ -63,8 +63,13 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
         true => last + text + pictures(scene, plan, drawn_before + 1) + stresses,
         false => 0,
     };
-    let most = [stepping, packing, tables, drawing].into_iter().max().unwrap_or(0);
-    program + RUNNING + stepped(plan) + on_the_way(scene, plan) + snapshots + most
+    // Each increment is measured while there is more of it than at the end.
+    let increments = match on_the_way(scene, plan) {
+        0 => 0,
+        beside => beside + solving(scene, plan).max(measured(plan)) + values + frames[0],
+    };
+    let most = [stepping, increments, packing, tables, drawing].into_iter().max().unwrap_or(0);
+    program + RUNNING + stepped(plan) + snapshots + most
 }
 
 /// Bytes of the places to which a body is taken back whose step diverges, or whose steps at once came to rest on the way.

@@ -555,7 +555,7 @@ fn a_material_in_parts_is_refused_for_what_it_is_refused_for_as_a_whole() {
         ("no chain of cells", &[apart, far]),
         ("are not connected", &[apart]),
         ("is outside the body", &["record={places=[[12.0,8.0],[8.4,4.3]]}"]),
-        ("roles[0] holds these particles altogether", &[&within]),
+        ("roles[0] holds these particles altogether", &[within]),
     ] {
         assert_refused_the_same(&plate(PLATE, &[&["record.probes=[]"], sets].concat()), what);
     }

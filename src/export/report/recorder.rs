@@ -25,8 +25,8 @@ use crate::flock::strain::Strain;
 use crate::material::cells::Cells;
 use crate::material::elastic::{Constants, Plane};
 use crate::material::stress::StressState;
-use crate::scene::Scene;
 use crate::scene::units::Units;
+use crate::scene::{LoadSteps, Scene};
 
 /// Up to so many particles everything has the bits from which the strains of a body that turns far are still
 /// exact; larger bodies have those that a screen can show, and the page says what that makes of strains.
@@ -98,9 +98,10 @@ pub(in crate::export) fn packed(scene: &Scene, plan: &Plan) -> Packed {
     let count = if is_sample { sample::size_of(total) } else { total };
     let are_neighbours_known = !is_sample && plan.setup.present_radius.is_none();
     let frames = Frames::new(count, channels(scene, total, are_neighbours_known, plan.setup.cells.is_some()));
-    let steps = match (scene.is_solved_at_once(), is_sample) {
-        (true, true) => 0,
-        (true, false) => LOAD_FRAMES,
+    let steps = match (&scene.load_steps, scene.is_solved_at_once(), is_sample) {
+        (Some(LoadSteps::Solved(parts)), ..) => parts.len(),
+        (_, true, true) => 0,
+        (_, true, false) => LOAD_FRAMES,
         _ => plan.stop.steps,
     };
     let is_exact = !is_sample && count <= MOST_EXACT;
