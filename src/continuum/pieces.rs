@@ -92,7 +92,7 @@ pub fn require_connected(body: &Body, neighbours: &Neighbours, team: &Team) -> R
     let sees = |i: usize| neighbours.of(i).iter().map(|&k| k as usize).max().unwrap_or(i);
     let end = owned.clone().map(sees).max().map_or(owned.end, |last| (last + 1).clamp(owned.end, exact.end));
     let members = |i: usize| !body.is_frame[i];
-    // And those before this part that do not see its own, who would name them.
+    // And those before this part that do not see its own: their rank does not name these.
     let sees = |from: u32, other: usize| neighbours.of(from as usize).contains(&(other as u32));
     let before = owned.clone().flat_map(|i| neighbours.of(i).iter().filter(move |&&k| !sees(k, i)));
     let before: BTreeSet<usize> =
