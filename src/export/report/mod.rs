@@ -4,7 +4,7 @@
 //! A page shows bodies in motion ([`view::View`]), charts and tables. The frames of an animation are kept
 //! while the run goes on (`recorder`, `frames`; those of a body in parts show a `sample` of it), at an interval that doubles
 //! when there are too many, as displacements in whole multiples of a power of two (`quantized_channel`), and written as differences, deflated (`encode`). The page
-//! computes PE1 and strain from displacements, and stress where an increment of the load has none; the values at the end are written to the last bit, as in
+//! computes PE1 and strain from displacements, and stress where frames have none; the values at the end are written to the last bit, as in
 //! `final.csv`.
 //!
 //! [`RunRecorder`] watches a run, `FlightRecorder` a flight.

@@ -210,12 +210,10 @@ impl Filter {
         flags: &mut Flags,
     ) -> [f64; 2] {
         let (here, last) = (seen.present.get(member), self.sent.get(member));
-        let ahead = self.ahead(seen, member);
         // One that has not come so far, or was carried away, is given its way from where it is seen.
-        let goes_on = ahead > 0.0 && distance(here, last) <= self.limits.speed * (period + ahead);
-        // One that was carried away cannot have come from where it is seen to its last target.
         let age = seen.ages[member].max(0.0);
         let is_near = distance(here, last) <= self.limits.speed * (period + age);
+        let goes_on = is_near && self.ahead(seen, member) > 0.0;
         let is_there = is_near || age > (1.0 - TOUCHING) * period || self.limits.deviation > 0.0;
         let has_arrived =
             self.limits.arrives && seen.known[member] && is_there && self.is_inexact(seen, period, member);
