@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 #[cfg(target_os = "linux")]
 #[global_allocator]
-static ALLOCATOR: cli::memory::LargePages = cli::memory::LargePages;
+static ALLOCATOR: cli::memory::ArrayAllocator = cli::memory::ArrayAllocator;
 
 fn main() -> ExitCode {
     let done = cli::arguments().and_then(|(arguments, ros)| {

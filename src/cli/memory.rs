@@ -75,16 +75,27 @@ pub fn return_what_is_dropped() {
     }
 }
 
-/// The system's allocator, which asks for large pages where an array is as long as one of them: the system sets up a page when it is
-/// first touched, and many give large ones only to what asks. A run of 1.1 million particles touches 176,000 pages for the first time
-/// instead of 354,000 (`perf stat -e page-faults flockform run`, AMD EPYC, 26 November 2026).
+/// The system's allocator, but for arrays: those of a page or more begin at a line of the caches, and for those as long as a large page
+/// it asks for large pages: the system sets up a page when it is first touched, and many give large ones only to what asks. A run of
+/// 1.1 million particles touches 176,000 pages for the first time instead of 354,000 (`perf stat -e page-faults flockform run`, AMD
+/// EPYC, 26 November 2026).
 #[cfg(target_os = "linux")]
-pub struct LargePages;
+pub struct ArrayAllocator;
 
 #[cfg(target_os = "linux")]
-impl LargePages {
-    /// Bytes of a large page, and of the pages that a mapping begins with \[B\].
+impl ArrayAllocator {
+    /// Bytes of a large page, and of a page \[B\].
     const PAGES: [usize; 2] = [1 << 21, 1 << 12];
+
+    /// Bytes of a line of the caches \[B\]. A sweep stores whole lines, and reads across two where what it reads begins elsewhere in a
+    /// line: with arrays that begin with one, bodies of 256 and 1024 squared are swept 1.3 and 1.4 times as fast (16 steps together,
+    /// one thread, alternated, Intel Xeon with AVX-512, 28 November 2026).
+    const LINE: usize = 64;
+
+    /// Whether it is an array, which the C library's own functions serve here.
+    fn is_array(layout: Layout) -> bool {
+        layout.size() >= Self::PAGES[1] && layout.align() <= align_of::<libc::max_align_t>()
+    }
 
     fn asked(array: *mut u8, bytes: usize) -> *mut u8 {
         let [large, small] = Self::PAGES;
@@ -100,27 +111,60 @@ impl LargePages {
     }
 }
 
-// SAFETY: all is done by the system's allocator, on the same conditions.
+// SAFETY: arrays are made, moved and freed by the C library, all else by the system's allocator: of a layout by the same always.
 #[cfg(target_os = "linux")]
-unsafe impl GlobalAlloc for LargePages {
+unsafe impl GlobalAlloc for ArrayAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        // SAFETY: as the caller's.
-        Self::asked(unsafe { System.alloc(layout) }, layout.size())
+        if !Self::is_array(layout) {
+            // SAFETY: as the caller's.
+            return unsafe { System.alloc(layout) };
+        }
+        let mut array = std::ptr::null_mut();
+        // SAFETY: a line is a power of two and a multiple of a pointer's size; where the call fails `array` stays null.
+        unsafe { libc::posix_memalign(&raw mut array, Self::LINE, layout.size()) };
+        Self::asked(array.cast(), layout.size())
     }
 
+    /// Zeroed arrays begin where they may: the system gives their pages as they are touched, and to align them would touch them.
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        // SAFETY: as the caller's.
-        Self::asked(unsafe { System.alloc_zeroed(layout) }, layout.size())
+        if !Self::is_array(layout) {
+            // SAFETY: as the caller's.
+            return unsafe { System.alloc_zeroed(layout) };
+        }
+        // SAFETY: the call asks nothing of its caller.
+        Self::asked(unsafe { libc::calloc(1, layout.size()) }.cast(), layout.size())
     }
 
     unsafe fn realloc(&self, array: *mut u8, layout: Layout, bytes: usize) -> *mut u8 {
-        // SAFETY: as the caller's.
-        Self::asked(unsafe { System.realloc(array, layout, bytes) }, bytes)
+        // SAFETY: the caller's: `bytes`, rounded up to the alignment, is at most what an `isize` holds.
+        let next = unsafe { Layout::from_size_align_unchecked(bytes, layout.align()) };
+        match [layout, next].map(Self::is_array) {
+            // SAFETY: as the caller's.
+            [false, false] => unsafe { System.realloc(array, layout, bytes) },
+            // SAFETY: the C library made the array.
+            [true, true] => Self::asked(unsafe { libc::realloc(array.cast(), bytes) }.cast(), bytes),
+            _ => {
+                // SAFETY: as the caller's, for a new array; the old one and the new one are apart, and hold what is copied.
+                unsafe {
+                    let moved = self.alloc(next);
+                    if !moved.is_null() {
+                        std::ptr::copy_nonoverlapping(array, moved, bytes.min(layout.size()));
+                        self.dealloc(array, layout);
+                    }
+                    moved
+                }
+            }
+        }
     }
 
     unsafe fn dealloc(&self, array: *mut u8, layout: Layout) {
-        // SAFETY: as the caller's.
-        unsafe { System.dealloc(array, layout) }
+        if Self::is_array(layout) {
+            // SAFETY: the C library made the array.
+            unsafe { libc::free(array.cast()) };
+        } else {
+            // SAFETY: as the caller's.
+            unsafe { System.dealloc(array, layout) };
+        }
     }
 }
 
@@ -187,6 +231,35 @@ fn least_room(mount: &str, path: &str, [limit, usage]: [&str; 2]) -> Option<u64>
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn arrays_begin_at_a_line_of_the_caches_and_hold_what_was_in_them_whatever_becomes_of_their_size() {
+        let alloc = ArrayAllocator;
+        let layout = |bytes| Layout::from_size_align(bytes, 8).expect("small");
+        let sizes = [24, 4088, 4096, 70_000, 3 << 20, 4104, 40, 5 << 20, 4096, 8];
+        // SAFETY: each array is made, written, read, moved and freed with the layout that it has.
+        unsafe {
+            for zeroed in [false, true] {
+                let mut array = if zeroed { alloc.alloc_zeroed(layout(8)) } else { alloc.alloc(layout(8)) };
+                array.write(7);
+                let mut before = 8;
+                for bytes in sizes {
+                    let made = alloc.alloc(layout(bytes));
+                    assert!(bytes < 4096 || made.addr().is_multiple_of(64), "{bytes}");
+                    alloc.dealloc(made, layout(bytes));
+                    let made = alloc.alloc_zeroed(layout(bytes));
+                    assert_eq!((made.read(), made.add(bytes - 1).read()), (0, 0));
+                    alloc.dealloc(made, layout(bytes));
+                    array = alloc.realloc(array, layout(before), bytes);
+                    assert_eq!((array.read(), array.addr() % 8), (7, 0), "{before} to {bytes}");
+                    array.add(bytes - 1).write(9);
+                    before = bytes;
+                }
+                alloc.dealloc(array, layout(before));
+            }
+        }
+    }
 
     #[test]
     fn numbers_are_read_behind_their_words() {
