@@ -141,6 +141,7 @@ impl Sweep {
             scene.is_ok_and(|scene| scene.takes_whole_numbers(key))
         };
         let design = request.design()?.in_whole_numbers(is_whole);
+        require_columns(&design, &request.outputs)?;
         let rows = rows.into_iter().map(|row| (row.run, row)).collect();
         let plan_digest = runs::first_digest(&arguments, &design);
         Ok(Self { begun: JournalHeader::new(request, &scene, plan_digest), scene, design, rows })
@@ -177,6 +178,9 @@ impl Sweep {
             outputs: &self.request().outputs,
             rows: &self.rows,
         };
+        if let Some(name) = arguments.plot.as_deref().filter(|name| !table.has_numbers(name)) {
+            note!("caution: `{name}` is a number in no run, so that there is nothing to draw");
+        }
         write_sweep(&folder, &table, arguments.figures.figures, arguments.plot.as_deref())?;
         let json = arguments.json.then(|| table.json());
         let kept = interrupt::commit(folder)?;
@@ -223,6 +227,20 @@ fn in_words(reason: &str) -> &str {
 
 fn scene_arguments(request: &SweepRequest) -> SceneArguments {
     SceneArguments::new(&request.scene, &request.set)
+}
+
+/// Refuses an output whose name another column of the table has.
+fn require_columns(design: &Design, outputs: &[String]) -> Result<(), Refusal> {
+    let rows = BTreeMap::new();
+    let table = Table { title: "", design, is_grid: true, outputs, rows: &rows };
+    let head = table.head();
+    match outputs.iter().find(|name| head.iter().filter(|column| *column == name).count() > 1) {
+        None => Ok(()),
+        Some(name) => {
+            let message = format!("the table would have two columns `{name}`");
+            Err(wrong("--outputs", message, "name it once; varied keys and `stop_reason` are there unasked").into())
+        }
+    }
 }
 
 /// Makes the runs, goes on with them, or puts shards together.

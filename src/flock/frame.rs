@@ -61,9 +61,10 @@ impl Frame {
     ) -> Self {
         let body = |site: Site| index(site).filter(|&i| !is_frame[i as usize]);
         let mut frame = Self { rule, points: Vec::new(), starts: vec![0], served: Vec::new() };
+        let mut around = Around::new(lattice);
         for (point, &site) in sites.iter().enumerate().filter(|&(point, _)| is_frame[point]) {
             frame.points.push(point as u32);
-            for near in nearest(lattice, site, &body) {
+            for near in around.nearest(site, &body) {
                 let opposite = [2 * near[0] - site[0], 2 * near[1] - site[1]];
                 let served =
                     if rule == FrameRule::Mirror { body(opposite).or(body(near)) } else { body(near) };
@@ -123,22 +124,51 @@ impl Frame {
     }
 }
 
-/// The body sites nearest to a frame site; several where they are equally near, as at a corner.
-fn nearest(lattice: &Lattice, site: Site, body: &impl Fn(Site) -> Option<u32>) -> Vec<Site> {
-    let place = |offset: &Site| [site[0] + offset[0], site[1] + offset[1]];
-    let mut radius = lattice.spacing();
-    // The frame reaches as far as the neighbourhood does, so a few doublings always find the body.
-    for _ in 0..16 {
-        let offsets = lattice.offsets_within(lattice.sublattice(site), radius);
-        if let Some(first) = offsets.iter().find(|offset| body(place(offset)).is_some()) {
-            let [x, y] = lattice.vector(*first);
-            let as_near = x.hypot(y) * (1.0 + 1e-9);
-            let found = lattice.offsets_within(lattice.sublattice(site), as_near);
-            return found.iter().map(place).filter(|&there| body(there).is_some()).collect();
-        }
-        radius *= 2.0;
+/// Offsets from sites to those around them, by sublattice: listed once for all frame sites, as far as one of them had to look.
+struct Around<'a> {
+    lattice: &'a Lattice,
+    /// How far the offsets reach \[length\], and they, nearest first; of each sublattice.
+    offsets: Vec<(f64, Vec<Site>)>,
+}
+
+impl<'a> Around<'a> {
+    fn new(lattice: &'a Lattice) -> Self {
+        Self { lattice, offsets: Vec::new() }
     }
-    Vec::new()
+
+    fn within(&mut self, sublattice: usize, radius: f64) -> &[Site] {
+        let known = self.offsets.len().max(sublattice + 1);
+        self.offsets.resize_with(known, Default::default);
+        let of = &mut self.offsets[sublattice];
+        if of.0 < radius {
+            *of = (radius, self.lattice.offsets_within(sublattice, radius));
+        }
+        &of.1
+    }
+
+    /// The body sites nearest to a frame site; several where they are equally near, as at a corner.
+    fn nearest(&mut self, site: Site, body: &impl Fn(Site) -> Option<u32>) -> Vec<Site> {
+        let lattice = self.lattice;
+        let place = |offset: &Site| [site[0] + offset[0], site[1] + offset[1]];
+        let is_body = |offset: &&Site| body(place(offset)).is_some();
+        let far = |offset: &Site| {
+            let [x, y] = lattice.vector(*offset);
+            x.hypot(y)
+        };
+        let mut radius = lattice.spacing();
+        // The frame reaches as far as the neighbourhood does, so a few doublings always find the body.
+        for _ in 0..16 {
+            let offsets = self.within(lattice.sublattice(site), radius);
+            if let Some(first) = offsets.iter().position(|offset| is_body(&offset)) {
+                // Equally near but for rounding, by which they are sorted among each other too.
+                let as_near = far(&offsets[first]) * (1.0 + 2e-9);
+                let alike = offsets[first..].iter().take_while(|offset| far(offset) <= as_near);
+                return alike.filter(is_body).map(place).collect();
+            }
+            radius *= 2.0;
+        }
+        Vec::new()
+    }
 }
 
 #[cfg(test)]

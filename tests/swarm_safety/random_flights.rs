@@ -38,7 +38,7 @@ const SOUND: Series = Series { model: DOUBLE, delay: 0, noise: 0.0, loss: 0.0, f
 /// What stops a robot, or its poses.
 const STOPS: &[&str] = &["silent", "dead", "stuck"];
 
-const SERIES: [Series; 18] = [
+const SERIES: [Series; 21] = [
     SOUND,
     Series { delay: 3, ..SOUND },
     Series { model: SINGLE, ..SOUND },
@@ -52,11 +52,14 @@ const SERIES: [Series; 18] = [
     Series { model: UNICYCLE, noise: 0.02, ..SOUND },
     Series { delay: 3, noise: 0.02, ..SOUND },
     Series { delay: 6, noise: 0.02, loss: 0.5, ..SOUND },
+    Series { model: SINGLE, delay: 6, noise: 0.02, loss: 0.5, ..SOUND },
+    Series { model: UNICYCLE, delay: 3, noise: 0.02, ..SOUND },
     Series { faults: STOPS, ..SOUND },
     Series { faults: STOPS, delay: 6, ..SOUND },
     Series { faults: STOPS, loss: 0.7, ..SOUND },
     Series { faults: STOPS, delay: 3, loss: 0.5, ..SOUND },
     Series { model: SINGLE, faults: STOPS, delay: 3, loss: 0.5, ..SOUND },
+    Series { model: SINGLE, faults: STOPS, delay: 3, noise: 0.02, loss: 0.5, ..SOUND },
 ];
 
 /// A swarm file: 2 to 9 robots in places that keep the clearance, each led to one random place after another,
@@ -236,6 +239,49 @@ fn noise_does_not_move_a_robot_that_is_hemmed_in_into_what_it_is_pressed_against
             let clearance = report.clearance.expect("there are others");
             assert!(clearance >= 0.2, "{model}, {limit}, seed {seed}: {clearance}");
         }
+    }
+}
+
+/// A crowd that swaps its places behind poses that are noisy and late, some of it stuck, silent or dead: a robot that has nowhere
+/// to go stands where it was sent, not where its last pose has it, or it goes after the noise of each.
+#[test]
+fn poses_that_are_noisy_and_late_do_not_lead_robots_into_each_other() {
+    const SIDE: usize = 5;
+    let place = |k: usize| [1.2 * (k % SIDE) as f64, 1.2 * (k / SIDE) as f64];
+    let fault = |robot: &str, at: f64, until: &str, kind: &str| {
+        format!("{{ robot = \"{robot}\", at = {at}{until}, what = {{ kind = \"{kind}\" }} }}")
+    };
+    let faults = [
+        fault("a12", 2.0, ", until = 5.0", "stuck"),
+        fault("a7", 1.5, ", until = 3.0", "silent"),
+        fault("a18", 2.5, "", "dead"),
+    ];
+    let faults = faults.join(", ");
+    for (k, model) in [SINGLE, IDEAL, UNICYCLE].into_iter().cycle().take(12).enumerate() {
+        let mut goals: Vec<usize> = (0..SIDE * SIDE).collect();
+        let mut random = Pcg64Mcg::seed_from_u64(k as u64);
+        goals.sort_by_cached_key(|_| random.random::<u64>());
+        let robot = |k: usize| format!("{{ name = \"a{k}\", place = {:?} }}", place(k));
+        let leader = |(k, &goal): (usize, &usize)| {
+            let by = [0, 1].map(|axis| place(goal)[axis] - place(k)[axis]);
+            format!(
+                "{{ robots = [\"a{k}\"], program = {{ kind = \"path\", points = [{{ at = 5.0, displacement = {by:?} }}] }} }}"
+            )
+        };
+        let (delay, noise) = ([2, 3, 6][k / 3 % 3], [0.005, 0.01][k % 2]);
+        let text = format!(
+            "title = \"crowd\"\nradius = 0.15\nlinks = {{ kind = \"nearest\", count = 5 }}\nrobots = [{}]\nleaders = [{}]\n\
+             limits = {{ speed = 2.0, clearance = 0.1 }}\ncontrol = {{ period = 0.05 }}\n\
+             flight = {{ duration = 12.0, model = {model}, noise = {noise}, delay = {delay}, seed = {k}, faults = [{}] }}\n",
+            (0..SIDE * SIDE).map(robot).collect::<Vec<_>>().join(", "),
+            goals.iter().enumerate().map(leader).collect::<Vec<_>>().join(", "),
+            if k < 6 { &faults } else { "" },
+        );
+        let swarm =
+            Swarm::parse("crowd", "crowd.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+        let (_, report) = fly(&swarm, &mut |_, _| ControlFlow::Continue(())).expect("flies");
+        let clearance = report.clearance.expect("there are others");
+        assert!(clearance >= 0.1, "{model}, delay {delay}, flight {k}: {clearance}");
     }
 }
 

@@ -85,8 +85,15 @@ impl Table<'_> {
             is_grid: self.is_grid,
             keys: (0..self.design.factors.len()).map(key).collect(),
             // Outputs that are the same everywhere are shown where there are no others.
-            outputs: if asked.is_empty() { all } else { asked },
+            outputs: if asked.is_empty() && plotted.is_none() { all } else { asked },
         })
+    }
+
+    /// Whether any run has a number for this output.
+    pub fn has_numbers(&self, output: &str) -> bool {
+        let is_number = |row: &Row, n: usize| row.outputs.get(n).is_some_and(|text| text.parse::<f64>().is_ok());
+        let at = self.outputs.iter().position(|name| name == output);
+        at.is_some_and(|n| self.rows.values().any(|row| is_number(row, n)))
     }
 }
 

@@ -108,12 +108,14 @@ fn range(text: &str) -> Result<([f64; 2], Option<usize>, bool), String> {
     Ok((ends, count, is_log))
 }
 
-/// The elements of a list, split at commas outside of brackets and quotes.
+/// The elements of a list, split at commas outside of brackets and quotes; the last may have a comma behind it, as in TOML.
 fn elements(list: &str) -> Vec<&str> {
     let (mut depth, mut quote, mut start) = (0_i32, None, 0);
     let mut found = Vec::new();
-    for (at, c) in list.char_indices() {
+    let mut characters = list.char_indices();
+    while let Some((at, c)) = characters.next() {
         match (quote, c) {
+            (Some('"'), '\\') => _ = characters.next(),
             (Some(open), c) if c == open => quote = None,
             (Some(_), _) => {}
             (None, '"' | '\'') => quote = Some(c),
@@ -126,7 +128,10 @@ fn elements(list: &str) -> Vec<&str> {
             (None, _) => {}
         }
     }
-    found.push(list[start..].trim());
+    let last = list[start..].trim();
+    if found.is_empty() || !last.is_empty() {
+        found.push(last);
+    }
     found
 }
 

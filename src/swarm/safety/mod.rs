@@ -30,7 +30,8 @@
 //! off by an angle of sine `e / d` at most, and the border is at least `(sqrt(d^2 - e^2) - s - e) / 2` away;
 //! turning it costs a further `2 sin(angle / 2) reach`. The cell takes all of that off, so it lies inside
 //! every cell that the true places could have. Where that leaves nothing, the member moves only away from
-//! all places where the other may be, or stays: age alone moves no member. This assumes
+//! all places where the other may be, or stays, where it was last sent if that is known: age alone moves no member, and a
+//! late pose is not where it stands. This assumes
 //! true ages and a speed limit that all members keep. For obstacles the member's own age counts.
 //!
 //! A loop that sends the targets of both members knows more: each goes straight to one target after the other, at whatever
@@ -96,10 +97,10 @@
 //! the second as often on as back, and a member that is already too near would follow it on each time and back never.
 //! One that does not brake is sent back to where it was last sent, where no place is far enough from all and that one
 //! is no farther out of its cell: a step from each pose would go after the noise. That leaves the declared clearance
-//! in all of the random flights that begin with it, late poses or not (`tests/swarm_safety`). Two cases are not
-//! covered. In a gap between solids that is narrower than the widened distances the way out is undetermined, and
-//! noise leads a member deeper. Late poses of members that take no time to brake carry the noise of several periods:
-//! in 1 of 90 random flights, with 3 periods and 2 cm, two came 2.5 cm nearer than declared.
+//! in all of the random flights that begin with it, late poses or not (`tests/swarm_safety`). Two members whose hulls
+//! noise brings nearer than allowed part, as two fresh ones do. One case is not
+//! covered: in a gap between solids that is narrower than the widened distances the way out is undetermined, and
+//! noise leads a member deeper.
 //!
 //! # Lying members
 //! A pose that is farther from the last one than the speed limit allows, and half a metre of noise, is not accepted

@@ -156,6 +156,9 @@ impl Filter {
         let drift = self.drift(seen, member);
         let margin = self.limits.margin();
         let brakes = self.crowd.brakes;
+        let last = self.sent.get(member);
+        let was_sent = self.ahead(seen, member) > 0.0 && last.iter().all(|x| x.is_finite());
+        let standing = if was_sent { last } else { here };
         for k in 0..self.crowd.found.len() {
             let other = self.crowd.found[k] as usize;
             let stray = drift + self.drift(seen, other);
@@ -179,7 +182,7 @@ impl Filter {
                 stray > 0.0 && are_between() && border().add_between(member < other, &mut self.cell.planes)
             };
             if !is_added {
-                add_border(&mut self.cell.planes, [here, there, aside], keep, stray, reach);
+                add_border(&mut self.cell.planes, [here, there, aside], standing, keep, stray, reach);
             }
         }
         let obstacles = self.cell.planes.len();
@@ -358,11 +361,12 @@ impl MotionRequest {
 
 /// Appends the half-planes that keep a member `here` on its own side of another, if they can matter
 /// within `reach` \[m\]: the module's docs prove it. `aside` is the direction to it where both stand at
-/// the very same place.
+/// the very same place; `standing` is where the member stands if it goes nowhere.
 #[inline]
 fn add_border(
     planes: &mut Vec<HalfPlane>,
     [here, there, aside]: [[f64; 2]; 3],
+    standing: [f64; 2],
     keep: f64,
     stray: f64,
     reach: f64,
@@ -387,14 +391,21 @@ fn add_border(
         }
         return;
     }
-    // Perhaps too near already: away from every place where the other may be, or no move at all.
-    planes.push(HalfPlane { normal, offset: fresh.min(0.0) });
+    // Perhaps too near already: away from every place where the other may be, or no move at all. A late pose is not where a
+    // member stands that was sent on, and a noisy one is none to follow.
+    let way = minus(there, standing);
+    let distance = length(way);
+    let normal = if distance > 0.0 { way.map(|x| x / distance) } else { aside };
+    let away = ((distance - keep) / 2.0).min(0.0);
+    let mut push = |normal: [f64; 2], offset: f64| {
+        planes.push(HalfPlane { normal, offset: offset + dot(normal, minus(standing, here)) });
+    };
+    push(normal, away);
     for sine in [sine, -sine] {
-        let normal = [cosine * normal[0] - sine * normal[1], sine * normal[0] + cosine * normal[1]];
-        planes.push(HalfPlane { normal, offset: 0.0 });
+        push([cosine * normal[0] - sine * normal[1], sine * normal[0] + cosine * normal[1]], 0.0);
     }
     if sine >= 1.0 {
-        planes.push(HalfPlane { normal: [-normal[0], -normal[1]], offset: (-fresh).max(0.0) });
+        push([-normal[0], -normal[1]], -away);
     }
 }
 

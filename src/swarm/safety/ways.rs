@@ -149,8 +149,9 @@ impl Border<'_> {
     }
 
     /// Appends the half-plane between members each of which is somewhere on its hull, `is_first` the one of the lower number;
-    /// false, and nothing, where that is no better than what their ages say, or the hulls are nearer than allowed, as noise
-    /// may bring them. Both members find the same.
+    /// false, and nothing, where that is no better than what their ages say, or the hulls have a point in common. Both members
+    /// find the same. Hulls that are nearer than allowed, as noise may bring them, part: a member that stood where its late pose
+    /// says instead would go after the noise of its poses, from each to the next.
     pub fn add_between(&self, is_first: bool, planes: &mut Vec<HalfPlane>) -> bool {
         let [own, other] = self.ways;
         // In one order, so that rounding does not make of it two.
@@ -161,7 +162,7 @@ impl Border<'_> {
         let distance = length(way);
         let seen = length(minus(other.way[0], own.way[0]));
         let by_age = (seen * seen - self.stray * self.stray).max(0.0).sqrt() - self.stray;
-        if distance < by_age.max(self.keep * (1.0 - TOUCHING)) {
+        if distance < by_age {
             return false;
         }
         let normal = way.map(|x| x / distance);
