@@ -238,7 +238,8 @@ fn require_columns(design: &Design, outputs: &[String]) -> Result<(), Refusal> {
         None => Ok(()),
         Some(name) => {
             let message = format!("the table would have two columns `{name}`");
-            Err(wrong("--outputs", message, "name it once; varied keys and `stop_reason` are there unasked").into())
+            Err(wrong("--outputs", message, "name it once; varied keys and `stop_reason` are there unasked")
+                .into())
         }
     }
 }

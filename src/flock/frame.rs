@@ -176,6 +176,7 @@ mod tests {
     use super::super::body::{Body, Cut};
     use super::super::lattice::LatticeKind;
     use super::super::neighbourhood::Neighbourhood;
+    use super::super::vectors::distance;
     use super::*;
     use crate::geometry::shape::Shape;
 
@@ -241,6 +242,25 @@ mod tests {
         seen.set(at([3, 2]), [3.0, 2.0 - 0.2]);
         let [dx, dy] = frame.displacement(k, &body.reference, &seen);
         assert!((dx - 0.2).abs() < 1e-15 && (dy + 0.1).abs() < 1e-15, "{dx} {dy}");
+    }
+
+    #[test]
+    fn a_wide_frame_serves_the_particles_that_none_is_nearer_than() {
+        for kind in LatticeKind::SAMPLES {
+            let wide = Neighbourhood::Within { radius: 4.5 * Lattice::new(kind, [0.0; 2], 0.0).spacing() };
+            let (body, _) = framed(kind, corner(), wide, FrameRule::Lagged);
+            let frame = body.frame.as_ref().expect("framed");
+            for (k, &point) in frame.points.iter().enumerate() {
+                let far = |i: usize| distance(body.reference.get(i), body.reference.get(point as usize));
+                let particles = (0..body.count()).filter(|&i| !body.is_frame[i]);
+                let least = particles.clone().map(far).fold(f64::INFINITY, f64::min);
+                let mut served = frame.served_by(k).to_vec();
+                served.sort_unstable();
+                let nearest: Vec<u32> =
+                    particles.filter(|&i| far(i) < least + 1e-6).map(|i| i as u32).collect();
+                assert_eq!(served, nearest, "{kind:?}");
+            }
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! What goes wrong with robots in flight, row by row: what the rest of the formation does.
 
 use flockform::flock::vectors::distance;
+use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::control::Control;
 use flockform::swarm::flight::Flight;
@@ -80,7 +81,11 @@ fn a_member_that_comes_back_is_believed_again_and_the_formation_is_whole() {
     let overrides = ["control.sweeps=1", fault];
     let (_, report) = flown(&load_swarm("square", &overrides));
     assert_eq!(report.most_lost, 1);
-    assert!(report.affine_error.expect("affine")[1] < 1e-3, "{:?}", report.affine_error);
+    assert!(
+        report.affine_error.is_some_and(|(_, end)| end.is_some_and(|end| end < 1e-3)),
+        "{:?}",
+        report.affine_error
+    );
 }
 
 /// What has not arrived yet is not lost; what never arrives is.
@@ -167,9 +172,66 @@ fn lost_late_and_doubled_poses_change_the_way_and_not_the_end() {
         let mut overrides = vec!["control.sweeps=1", "flight.duration=150.0", "flight.bounds={}"];
         overrides.extend(more);
         let (_, report) = flown(&load_swarm("square", &overrides));
-        let [_, last] = report.affine_error.expect("affine");
+        let Some((_, Some(last))) = report.affine_error else { panic!("affine to the end") };
         assert!(last < 0.02, "{more:?}: {last}");
     }
+}
+
+/// Every sweep of a period leaves it out, not the last alone.
+#[test]
+fn a_liar_or_a_lost_robot_moves_nobody_however_many_sweeps_a_period_has() {
+    let lie = "flight.faults=[{ robot = \"robot_13\", at = 1.0, what = { kind = \"offset\", by = [100.0, -100.0] } }]";
+    let silent = "flight.faults=[{ robot = \"robot_13\", at = 1.0, what = { kind = \"silent\" } }]";
+    for sweeps in [1, 2, 5] {
+        let sweeps = format!("control.sweeps={sweeps}");
+        let (_, report) = flown(&load_swarm("faulty-robot", &[&sweeps, lie]));
+        assert!(report.holds(), "{sweeps}: {:?}", report.bounds);
+        let all = bundled_swarm("faulty-robot").expect("bundled").text;
+        let believing = all.replace("[resilience]\nmax_faulty_neighbours = 1\n", "");
+        assert!(believing.len() < all.len());
+        let alone = [sweeps.clone(), silent.to_owned(), "flight.bounds={}".to_owned()];
+        let swarm = Swarm::parse("alone", "alone.toml", &believing, &alone, None)
+            .unwrap_or_else(|error| panic!("{error}"));
+        let mut flight = Flight::new(&swarm).unwrap_or_else(|error| panic!("{error}"));
+        fly_to_end(&mut flight);
+        let places = flight.fleet().places();
+        let formation = flight.control().formation();
+        let apart = |m: usize| {
+            let [x, y] = formation.places.get(m);
+            distance(places.get(m), [x + 4.0, y + 2.0])
+        };
+        let worst = (0..formation.count()).filter(|&m| m != MIDDLE).map(apart).fold(0.0, f64::max);
+        assert!(worst < 1e-6, "{sweeps}: {worst}");
+    }
+}
+
+#[test]
+fn weights_below_zero_cannot_leave_out_liars() {
+    let overrides = [
+        "neighbours.radius=2",
+        "leaders[0].region={ kind = \"ids\", ids = [1, 2, 3, 4, 5, 6, 10, 11, 15, 16, 21] }",
+        "rule={ weights = { kind = \"solved\" } }",
+    ];
+    let refused = Flight::new(&load_swarm("faulty-robot", &overrides)).err().expect("refused").to_string();
+    assert!(refused.contains("some of `rule.weights` are below 0"), "{refused}");
+}
+
+/// The places that the errors are measured from, to the end: those by the leaders' motion only while it is affine.
+#[test]
+fn a_leader_that_is_sent_away_after_a_manoeuvre_breaks_the_bound_on_the_end() {
+    let text = "title = \"away\"\nradius = 0.2\nlinks = { kind = \"nearest\", count = 4 }\n\
+                robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [2.0, 0.0] }, { name = \"c\", place = [0.0, 2.0] }, \
+                { name = \"d\", place = [2.0, 2.0] }, { name = \"e\", place = [1.0, 1.0] }]\n\
+                leaders = [{ robots = [\"a\", \"b\", \"c\"], program = { kind = \"manoeuvre\", name = \"m\" } }]\n\
+                manoeuvres = [{ name = \"m\", legs = [{ seconds = 1.0, translate = [0.1, 0.0] }] }]\n\
+                limits = { speed = 0.2, clearance = 0.1 }\ncontrol = { sweeps = 200 }\n\
+                [flight]\nduration = 6.0\nmodel = { kind = \"integrator\" }\nbounds = { final_error = 0.01 }\n\
+                commands = [{ after = 60, what = { kind = \"lead\", robot = \"a\", to = [-8.0, -8.0] } }]\n";
+    let (_, report) = flown(&Swarm::parse("away", "away.toml", text, &[], None).expect("a swarm"));
+    assert!(report.affine_error.is_some_and(|(_, end)| end.is_none()), "{:?}", report.affine_error);
+    let bound = &report.bounds[0];
+    assert!(!bound.holds && bound.found.is_some_and(|found| found > 10.0), "{bound:?}");
+    assert_eq!(bound.worst.as_ref().map(|worst| worst.time), Some(6.0), "{bound:?}");
 }
 
 #[test]

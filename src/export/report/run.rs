@@ -105,7 +105,8 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
     );
     let strain = largest_quantum(animation) / animation.spacing;
     if bits < FINE_BITS {
-        note += &format!(" That leaves strains before the last frame uncertain by about {}.", number(strain));
+        let when = if animation.exact.is_empty() { "" } else { " before the last frame" };
+        note += &format!(" That leaves strains{when} uncertain by about {}.", number(strain));
     }
     if animation.stress.is_some() && outcome.engine.free_edge().is_some() {
         note += " Stress before the last frame is the mean of each particle's cells, at the last recovered along the outline too, as in \

@@ -91,7 +91,8 @@ impl Table<'_> {
 
     /// Whether any run has a number for this output.
     pub fn has_numbers(&self, output: &str) -> bool {
-        let is_number = |row: &Row, n: usize| row.outputs.get(n).is_some_and(|text| text.parse::<f64>().is_ok());
+        let is_number =
+            |row: &Row, n: usize| row.outputs.get(n).is_some_and(|text| text.parse::<f64>().is_ok());
         let at = self.outputs.iter().position(|name| name == output);
         at.is_some_and(|n| self.rows.values().any(|row| is_number(row, n)))
     }

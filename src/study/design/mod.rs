@@ -342,4 +342,17 @@ mod tests {
         let counted = Design::sampled(factors(&["a=0:1:5"]), 3, Sampling::Random, 0);
         assert!(refused(counted).contains("--samples"));
     }
+
+    #[test]
+    fn a_list_is_split_as_toml_has_it() {
+        let of = |text: &str| {
+            let design = Design::grid(factors(&[text])).expect("a grid");
+            design.runs.iter().map(|run| run[0].text.clone()).collect::<Vec<_>>()
+        };
+        assert_eq!(
+            of(r#"a=["p", "a \" b", "q \" r", 'z\', x]"#),
+            ["\"p\"", r#""a \" b""#, r#""q \" r""#, r"'z\'", "x"]
+        );
+        assert_eq!(of("a=[[1, 2,], [3],]"), ["[1, 2,]", "[3]"]);
+    }
 }

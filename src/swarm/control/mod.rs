@@ -9,8 +9,7 @@ pub mod state;
 
 use serde::{Deserialize, Serialize};
 
-use super::formation::{Formation, LeadSnapshot, Measures, Seen};
-use super::resilience::trim;
+use super::formation::{Among, Formation, LeadSnapshot, Measures, Seen};
 use super::robots::{DoubleIntegrator, Robot};
 use super::safety::{self, Filter, Flags, Limits, SafetyError, Stray};
 use super::transport::Received;
@@ -545,26 +544,19 @@ impl Control {
         self.run += 1;
         self.periods += 1;
         let time = self.program_time();
-        let seen = Seen { present: &self.present, usable: &self.usable, known: &self.known };
-        self.formation.advance(&seen, time, self.sweeps, &mut self.wanted);
-        for member in (0..self.formation.count()).filter(|&member| self.usable[member]) {
-            if self.formation.leads(member) {
-                continue;
-            }
+        let seen = Seen { present: &self.present, known: &self.known };
+        let mut among = Vec::new();
+        for member in (0..self.formation.count()).filter(|&m| self.usable[m] && !self.formation.leads(m)) {
             let lost = self.formation.neighbours(member).any(|k| !self.usable[k]);
-            let target = if self.max_faulty > 0 {
-                let (target, trimmed) = self.resilient_target(member, &seen);
-                self.flags[member] |= if trimmed { Flags::TRIMMED } else { 0 };
-                Some(target)
-            } else if lost {
-                self.formation.target_among(member, &seen, |_| true)
-            } else {
-                continue;
-            };
-            if lost {
-                self.flags[member] |= Flags::NEIGHBOUR_LOST;
+            if lost || self.max_faulty > 0 {
+                let heard = self.formation.neighbours(member).filter(|&k| self.usable[k]).collect();
+                among.push(Among { member, heard, liars: self.max_faulty, is_trimmed: false });
             }
-            self.wanted.set(member, target.unwrap_or(self.present.get(member)));
+            self.flags[member] |= if lost { Flags::NEIGHBOUR_LOST } else { 0 };
+        }
+        self.formation.advance(&seen, &mut among, time, self.sweeps, &mut self.wanted);
+        for one in among.iter().filter(|one| one.is_trimmed) {
+            self.flags[one.member] |= Flags::TRIMMED;
         }
     }
 
@@ -585,25 +577,6 @@ impl Control {
         let since = self.led_since.filter(|&since| since <= self.now).unwrap_or(self.now);
         self.led_since = Some(since);
         self.now - since >= PATIENCE
-    }
-
-    /// The target by those neighbours alone whose displacements do not stray from the member's own, axis by axis,
-    /// and whether any does. With no neighbour left on an axis the member stays where it is on that axis.
-    fn resilient_target(&self, member: usize, seen: &Seen<'_>) -> ([f64; 2], bool) {
-        let displacement = |m: usize| {
-            let (now, then) = (self.present.get(m), self.formation.places.get(m));
-            [now[0] - then[0], now[1] - then[1]]
-        };
-        let heard: Vec<usize> = self.formation.neighbours(member).filter(|&k| self.usable[k]).collect();
-        let all: Vec<[f64; 2]> = heard.iter().map(|&k| displacement(k)).collect();
-        let mut keep = Vec::new();
-        trim(self.formation.trim(), displacement(member), &all, self.max_faulty, &mut keep);
-        let here = self.present.get(member);
-        let along = |axis: usize| {
-            let keeps = |k: usize| heard.iter().zip(&keep).any(|(&other, keep)| other == k && keep[axis]);
-            self.formation.target_among(member, seen, keeps).map_or(here[axis], |target| target[axis])
-        };
-        ([along(0), along(1)], keep.iter().any(|keep| *keep != [true; 2]))
     }
 
     /// The member's safe target \[m\]; `None` without a usable pose, and while the loop is inactive.
@@ -651,9 +624,21 @@ impl Control {
         self.formation.measures(&self.last_places())
     }
 
-    /// Each member's place of rest with the leaders as they are \[m\]; `None` where the rule is not linear.
+    /// Each member's place of rest with the leaders as they are \[m\]; `None` where the rule is not linear, and while a leader is lost,
+    /// which its neighbours leave out.
     pub fn settled(&self) -> Option<Vectors> {
-        self.formation.settled(&self.last_places())
+        self.settled_at(&self.last_places())
+    }
+
+    /// The same with the leaders at their places in `present` \[m\]. Members that leave out straying neighbours come to rest by no linear
+    /// rule, but follow leaders that are all sent the same way.
+    pub fn settled_at(&self, present: &Vectors) -> Option<Vectors> {
+        if self.max_faulty > 0 {
+            return self.formation.moved_together(self.program_time());
+        }
+        let is_lost = |m: usize| self.formation.leads(m) && !self.usable[m];
+        let any_lost = (0..self.formation.count()).any(is_lost);
+        (!any_lost).then(|| self.formation.settled(present)).flatten()
     }
 
     /// Largest distance of a follower with a usable pose from where it comes to rest \[m\].

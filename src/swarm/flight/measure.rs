@@ -103,7 +103,7 @@ impl Record {
         let affine = formation.affine(control.program_time()).filter(|_| control.has_begun());
         let affine = affine.map(|map| farthest(&|m| map.apply(formation.places.get(m)), true));
         let led_to = |m: usize| Some(control.wanted(m)).filter(|place| place.iter().all(|x| x.is_finite()));
-        let rest = formation.settled(&present).map(|rest| {
+        let rest = control.settled_at(&present).map(|rest| {
             let place = |m: usize| led_to(m).filter(|_| formation.leads(m)).unwrap_or_else(|| rest.get(m));
             farthest(&place, true)
         });

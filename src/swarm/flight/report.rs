@@ -27,10 +27,10 @@ pub struct FlightReport {
     pub seconds: f64,
     /// Periods flown.
     pub periods: u64,
-    /// Largest, and at the end; absent where the leaders' motion is not affine.
-    pub affine_error: Option<[f64; 2]>,
-    /// Largest, and at the end; absent where the rule has no single place of rest.
-    pub formation_error: Option<[f64; 2]>,
+    /// Largest \[m\], and at the end, where the leaders' motion is still affine then; absent where it never is.
+    pub affine_error: Option<(f64, Option<f64>)>,
+    /// The same from where the rule comes to rest; absent where it has no single place of rest.
+    pub formation_error: Option<(f64, Option<f64>)>,
     /// When the leaders' programs end; absent where they never do.
     pub programs_end: Option<f64>,
     /// Whether the flight lasted until then. Before, there is neither a settling time nor an end to be at.
@@ -119,8 +119,9 @@ impl Verdict {
 impl FlightReport {
     /// What was measured, under its names; `number` writes lengths and times.
     pub fn facts(&self, number: impl Fn(f64) -> String) -> Vec<(&'static str, String)> {
-        let pair = |[largest, last]: [f64; 2]| {
-            format!("largest {} m, at the end {} m", number(largest), number(last))
+        let pair = |(largest, last): (f64, Option<f64>)| match last {
+            Some(last) => format!("largest {} m, at the end {} m", number(largest), number(last)),
+            None => format!("largest {} m, none at the end", number(largest)),
         };
         let within = number(self.settled_within);
         let settled = match (self.settling_time, self.programs_end) {
@@ -179,8 +180,8 @@ impl FlightReport {
             model: flight.fleet().model().name(),
             seconds: flight.fleet().time(),
             periods: flight.fleet().period(),
-            affine_error: largest_and_last(samples, |s| s.affine_error),
-            formation_error: largest_and_last(samples, |s| s.formation_error),
+            affine_error: largest_and_end(samples, |s| s.affine_error),
+            formation_error: largest_and_end(samples, |s| s.formation_error),
             programs_end: finite(programs_end),
             programs_ended,
             programs_began: flight.control().has_begun(),
@@ -240,6 +241,12 @@ fn largest_and_last(samples: &[Sample], of: impl Fn(&Sample) -> Option<f64>) -> 
     Some([samples.iter().filter_map(&of).fold(0.0, f64::max), last])
 }
 
+/// The largest, and that at the very end where there is one there.
+fn largest_and_end(samples: &[Sample], of: impl Fn(&Sample) -> Option<f64>) -> Option<(f64, Option<f64>)> {
+    let [largest, _] = largest_and_last(samples, &of)?;
+    Some((largest, samples.last().and_then(of)))
+}
+
 /// From the end of the programs to the first time after which the shape holds for good.
 fn settling_time(samples: &[Sample], programs_end: f64, within: f64) -> Option<f64> {
     let error = |s: &Sample| s.affine_error.or(s.formation_error);
@@ -276,21 +283,24 @@ fn verdicts(
         })
     };
     let [affine, rest, continuum] = [0, 1, 2];
-    let shape = if report.affine_error.is_some() { affine } else { rest };
+    let (by_motion, by_rule) =
+        (report.affine_error.and_then(|(_, end)| end), report.formation_error.and_then(|(_, end)| end));
     // A robot that is lost to the end has not flown to its place, wherever that is by now.
     let is_final = report.programs_ended && !any_lost;
-    let last = report.affine_error.or(report.formation_error).map(|[_, last]| last).filter(|_| is_final);
+    let last = by_motion.or(by_rule).filter(|_| is_final);
     let farthest = |which: usize| record.farthest.iter().filter_map(move |all| all[which]);
     let largest = |which| farthest(which).max_by(|a, b| a.value.total_cmp(&b.value));
+    // By the leaders' motion while it is affine, as the errors are.
+    let mut by_shape = record.farthest.iter().map(|all| all[affine].or(all[rest]));
+    let at_end = by_shape.clone().next_back().flatten();
     // The robot that kept the formation from being settled.
-    let unsettled = farthest(shape).rfind(|one| one.value > bounds.settled_within);
-    let [unsettled, at_end] =
-        [unsettled, farthest(shape).next_back()].map(|one| one.filter(|_| report.programs_ended));
+    let unsettled = by_shape.rfind(|one| one.is_some_and(|one| one.value > bounds.settled_within)).flatten();
+    let [unsettled, at_end] = [unsettled, at_end].map(|one| one.filter(|_| report.programs_ended));
     let all = [
         at_most(
             "affine_error",
             bounds.affine_error,
-            report.affine_error.map(|[most, _]| most),
+            report.affine_error.map(|(most, _)| most),
             largest(affine),
         ),
         at_most("final_error", bounds.final_error, last, at_end),

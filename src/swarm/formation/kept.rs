@@ -90,8 +90,8 @@ impl Formation {
         if self.is_scene || !matches!(self.course, TargetSource::Rule { .. }) {
             let none = vec![false; self.count()];
             let (places, mut targets) = (self.places.clone(), Vectors::zeros(self.count()));
-            let seen = Seen { present: &places, usable: &none, known: &none };
-            (0..periods).for_each(|_| self.advance(&seen, 0.0, 1, &mut targets));
+            let seen = Seen { present: &places, known: &none };
+            (0..periods).for_each(|_| self.advance(&seen, &mut [], 0.0, 1, &mut targets));
         }
     }
 }

@@ -14,6 +14,7 @@ mod settling;
 use std::sync::Arc;
 
 use crate::engine::Engine;
+use crate::flock::law::Weights;
 use crate::flock::manoeuvre::{Affine, Manoeuvre, Posture};
 use crate::flock::motion::Motion;
 use crate::flock::neighbourhood::Neighbours;
@@ -23,7 +24,7 @@ use crate::flock::rules::Mean;
 use crate::flock::strain::{Strain, strain};
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::swarm::NamedManoeuvre;
-use crate::swarm::resilience::{Trim, supported};
+use crate::swarm::resilience::{Trim, supported, trim};
 use crate::sweep::Order;
 pub(in crate::swarm) use checks::first_few;
 pub use kept::LeadSnapshot;
@@ -90,8 +91,6 @@ pub enum Lead {
 pub struct Seen<'a> {
     /// Last known places \[m\], shape \[members\]; those of members never seen are not used.
     pub present: &'a Vectors,
-    /// Members whose poses the others may use, shape \[members\].
-    pub usable: &'a [bool],
     /// Members that have been seen at least once, shape \[members\].
     pub known: &'a [bool],
 }
@@ -281,10 +280,18 @@ impl Formation {
 
     /// Moves the formation on by a period that ends at `time` \[s\]: `targets` are set to the places to which the
     /// leaders' programs and the rule send the members. With more than one sweep the followers' targets come nearer
-    /// to where they would rest behind the leaders.
-    pub fn advance(&mut self, seen: &Seen<'_>, time: f64, sweeps: usize, targets: &mut Vectors) {
+    /// to where they would rest behind the leaders. The followers of `among` go by some neighbours alone, in every sweep.
+    pub fn advance(
+        &mut self,
+        seen: &Seen<'_>,
+        among: &mut [Among],
+        time: f64,
+        sweeps: usize,
+        targets: &mut Vectors,
+    ) {
         let leads: Vec<(usize, [f64; 2])> =
             (0..self.count()).filter_map(|m| Some((m, self.led_to(m, time)?))).collect();
+        let how = self.trim();
         match &mut self.course {
             TargetSource::Recorded { steps, step } => {
                 *step = (*step + 1).min(steps.len() - 1);
@@ -303,6 +310,15 @@ impl Formation {
                 for sweep in 0..sweeps {
                     leads.iter().for_each(|&(m, place)| engine.lead(particles[m], place));
                     engine.advance();
+                    if !among.is_empty() {
+                        let target = |one: &mut Among| {
+                            let (target, is_trimmed) = one.target(engine, particles, how);
+                            one.is_trimmed |= sweep == 0 && is_trimmed;
+                            (particles[one.member], target)
+                        };
+                        let places: Vec<(usize, [f64; 2])> = among.iter_mut().map(target).collect();
+                        engine.observe(places);
+                    }
                     // After the first sweep the leaders' move has reached their neighbours alone.
                     if sweep > 0 && engine.movement().largest_move <= SETTLED {
                         break;
@@ -314,29 +330,8 @@ impl Formation {
         self.look_at_roles();
     }
 
-    /// The follower's target by the neighbours alone that `keeps` selects, as [`Formation::advance`] would compute it
-    /// from their last known places; `None` where they are too few.
-    pub fn target_among(
-        &self,
-        member: usize,
-        seen: &Seen<'_>,
-        keeps: impl Fn(usize) -> bool + Clone,
-    ) -> Option<[f64; 2]> {
-        let TargetSource::Rule { engine, particles } = &self.course else { return None };
-        // The engine's state before the step, which the members' sightings were put into.
-        let before = engine.previous();
-        let of_particle = |i: usize| particles.binary_search(&i).ok();
-        let flock = engine.flock();
-        let target = flock.target_among(particles[member], before, |i| {
-            of_particle(i).is_none_or(|m| seen.usable[m] && keeps(m))
-        })?;
-        let damping = engine.update().damping;
-        let here = seen.present.get(member);
-        Some([0, 1].map(|k| here[k] + damping * (target[k] - here[k])))
-    }
-
     /// The coordinates that are left out together of faulty neighbours: matrix weights mix the axes.
-    pub fn trim(&self) -> Trim {
+    fn trim(&self) -> Trim {
         match self.engine().map(|engine| engine.flock().rule.mean) {
             Some(Mean::Material { .. }) => Trim::Whole,
             _ => Trim::PerAxis,
@@ -348,6 +343,12 @@ impl Formation {
     /// # Errors
     /// A sentence that names the robot and what it lacks.
     pub(crate) fn require_support(&self, liars: usize) -> Result<(), String> {
+        // What is left of weights of both signs may add up to nothing, by which it is divided.
+        if let Some(Weights::Scalar(weights)) = self.engine().map(|engine| &engine.flock().weights)
+            && weights.iter().any(|&weight| weight < 0.0)
+        {
+            return Err("needs weights of one sign, and some of `rule.weights` are below 0".to_owned());
+        }
         let lists = (0..self.count()).map(|m| self.neighbours(m).map(|k| k as u32).collect::<Vec<_>>());
         let leaders: Vec<bool> = (0..self.count()).map(|m| self.leads(m)).collect();
         supported(&Neighbours::from_lists(lists), &leaders, liars, self.trim())
@@ -362,6 +363,20 @@ impl Formation {
         };
         let of = engine.map_or(&[][..], |engine| engine.flock().neighbours.of(particles[member]));
         of.iter().filter_map(|&i| particles.binary_search(&(i as usize)).ok())
+    }
+
+    /// Each member's place \[m\] where all leaders are sent the same way from theirs by `time` \[s\].
+    pub fn moved_together(&self, time: f64) -> Option<Vectors> {
+        let by = |m: usize| {
+            let (to, from) = (self.led_to(m, time)?, self.places.get(m));
+            Some([to[0] - from[0], to[1] - from[1]])
+        };
+        let mut all = (0..self.count()).filter_map(by);
+        let first = all.next()?;
+        let size = |[x, y]: [f64; 2]| x.hypot(y);
+        let rounding = 1e-9 * (size(first) + self.spacing);
+        all.all(|way| distance(way, first) <= rounding)
+            .then(|| self.places.iter().map(|[x, y]| [x + first[0], y + first[1]]).collect())
     }
 
     /// Each member's place of rest with the leaders at their places in `present` \[m\]; `None` where the rule is not
@@ -421,6 +436,47 @@ impl Formation {
             self.settled_roles = engine.roles().to_vec();
             self.settling = Settling::of(engine).map(Arc::new);
         }
+    }
+}
+
+/// A follower that goes by some of its neighbours alone: the others are lost, or not believed.
+#[derive(Clone, Debug)]
+pub struct Among {
+    /// Its number.
+    pub member: usize,
+    /// The neighbours that are heard.
+    pub heard: Vec<usize>,
+    /// Of those, the liars tolerated: it leaves out as many of the neighbours that stray farthest from it.
+    pub liars: usize,
+    /// Whether it left out any by where they are seen.
+    pub is_trimmed: bool,
+}
+
+impl Among {
+    /// Where its neighbours send it in the sweep that the engine has just taken \[m\], and whether it left out any of those heard. It
+    /// stays along an axis on which there are too few.
+    fn target(&self, engine: &Engine, particles: &[usize], how: Trim) -> ([f64; 2], bool) {
+        let (flock, before, reference) = (engine.flock(), engine.previous(), &engine.body().reference);
+        let particle = particles[self.member];
+        let displacement = |m: usize| {
+            let ([x, y], from) = (before.get(particles[m]), reference.get(particles[m]));
+            [x - from[0], y - from[1]]
+        };
+        let mut keep = vec![[true; 2]; self.heard.len()];
+        if self.liars > 0 {
+            let all: Vec<[f64; 2]> = self.heard.iter().map(|&m| displacement(m)).collect();
+            trim(how, displacement(self.member), &all, self.liars, &mut keep);
+        }
+        let here = before.get(particle);
+        let target = [0, 1].map(|axis| {
+            let counts = |i: usize| match particles.binary_search(&i) {
+                Ok(m) => self.heard.iter().zip(&keep).any(|(&heard, keep)| heard == m && keep[axis]),
+                Err(_) => true,
+            };
+            let target = flock.target_among(particle, before, counts);
+            target.map_or(here[axis], |to| here[axis] + engine.update().damping * (to[axis] - here[axis]))
+        });
+        (target, keep.iter().any(|keep| *keep != [true; 2]))
     }
 }
 

@@ -80,6 +80,6 @@ fn next(formation: &mut Formation, off: Option<(usize, usize)>, sweeps: usize) -
     }
     let all = vec![true; formation.count()];
     let mut targets = present.clone();
-    formation.advance(&Seen { present: &present, usable: &all, known: &all }, 0.0, sweeps, &mut targets);
+    formation.advance(&Seen { present: &present, known: &all }, &mut [], 0.0, sweeps, &mut targets);
     targets
 }

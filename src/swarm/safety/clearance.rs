@@ -131,4 +131,21 @@ mod tests {
         filter.clearance_on_the_way([&before, &after], None, &mut nearest);
         assert!(nearest.iter().all(|&nearest| nearest < -0.25), "{nearest:?}");
     }
+
+    #[test]
+    fn of_solids_that_lie_in_each_other_the_deepest_counts() {
+        let square =
+            |half: f64| Obstacle::Polygon(vec![[-half, -half], [half, -half], [half, half], [-half, half]]);
+        let disc = |radius| Obstacle::Disc { centre: [0.0; 2], radius };
+        let at = |solids: &[Obstacle]| Obstacles::new(solids).expect("solids").distance([0.1, 0.0]);
+        for (solids, depth) in [
+            ([disc(2.0), square(0.5)], 1.9),
+            ([square(2.0), square(0.5)], 1.9),
+            ([square(2.0), disc(0.5)], 1.9),
+            ([disc(0.5), disc(2.0)], 1.9),
+            ([disc(0.05), square(0.5)], 0.4),
+        ] {
+            assert!((at(&solids) + depth).abs() < 1e-12, "{solids:?}");
+        }
+    }
 }

@@ -273,19 +273,21 @@ impl Obstacles {
         );
         let mut within = Vec::new();
         self.find_solids(place, &mut within);
-        let depth = |piece: &Piece| match piece {
-            Piece::Edge { segment, outline } if within[*outline] => {
-                Some(segment.distance_to_local_point(here, true))
+        // Of several solids around it the deepest counts.
+        let mut depths = vec![f64::INFINITY; within.len()];
+        let mut deepest = border.map_or(f64::INFINITY, |(_, Distance(distance))| distance);
+        if deepest < 0.0 || within.contains(&true) {
+            for piece in &self.pieces {
+                match piece {
+                    Piece::Edge { outline, .. } => {
+                        depths[*outline] = depths[*outline].min(piece.distance(here))
+                    }
+                    Piece::Disc { .. } => deepest = deepest.min(piece.distance(here)),
+                }
             }
-            _ => None,
-        };
-        match border {
-            _ if within.contains(&true) => {
-                -self.pieces.iter().filter_map(depth).fold(f64::INFINITY, f64::min)
-            }
-            Some((_, Distance(distance))) => distance,
-            None => f64::INFINITY,
         }
+        let depths = depths.iter().zip(&within).filter(|(_, within)| **within);
+        depths.fold(deepest, |deepest, (depth, _)| deepest.min(-depth))
     }
 
     /// The least distance from a straight way to a solid \[m\], as [`Obstacles::distance`] has that of a place; of one that goes

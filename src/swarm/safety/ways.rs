@@ -99,8 +99,11 @@ fn nearest_of(first: &Ways, second: &Ways) -> Option<[[f64; 2]; 2]> {
     let square = |[a, b]: &[[f64; 2]; 2]| dot(minus(*b, *a), minus(*b, *a));
     let [near, far] = from.chain(to).min_by(|a, b| square(a).total_cmp(&square(b)))?;
     let way = minus(far, near);
-    // The line across the way parts convex hulls that have no point in common.
-    let most = TOUCHING * square(&[near, far]);
+    // The line across the way parts convex hulls that have no point in common. The direction of a short way is known no better
+    // than its ends are.
+    let far_out = near.iter().chain(&far).fold(0.0, |most: f64, x| most.max(x.abs()));
+    let size = first.extent + second.extent + length(way);
+    let most = TOUCHING * square(&[near, far]) + 16.0 * f64::EPSILON * (far_out + size) * size;
     let is_before = first.corners.iter().all(|&corner| dot(way, minus(corner, near)) <= most);
     let is_behind = second.corners.iter().all(|&corner| dot(way, minus(far, corner)) <= most);
     (way != [0.0; 2] && is_before && is_behind).then_some([near, far])
@@ -296,5 +299,23 @@ mod tests {
         assert_eq!((point.corners.as_slice(), point.is_point()), (&[[1.0, 2.0]][..], true));
         assert_eq!(nearest_of(&point, &line), Some([[1.0, 2.0], [1.5, 1.5]]));
         assert_eq!(nearest_of(&line, &ways(&[[0.0, 2.0], [2.0, 0.0]])), None);
+    }
+
+    #[test]
+    fn hulls_that_hardly_have_a_distance_are_apart_all_the_same() {
+        let corners = [[0.1, 0.2], [0.9, 0.73], [0.3, 1.0]];
+        let normal = [0.53, -0.8].map(|x: f64| x / 0.53_f64.hypot(0.8));
+        for (share, gap) in
+            (1..40).flat_map(|k| [1e-3, 1e-5, 1e-7, 1e-9].map(|gap| (0.025 * f64::from(k), gap)))
+        {
+            let beside = |far: f64| [0, 1].map(|k| corners[0][k] + share * [0.8, 0.53][k] + far * normal[k]);
+            let found = nearest_of(&ways(&corners), &ways(&[beside(gap), beside(1.0)]));
+            let distance = found.map(|[near, far]| length(minus(far, near)));
+            assert!(
+                distance.is_some_and(|distance| (distance / gap - 1.0).abs() < 1e-6),
+                "{gap}: {distance:?}"
+            );
+            assert_eq!(nearest_of(&ways(&corners), &ways(&[beside(-gap), beside(1.0)])), None, "{gap}");
+        }
     }
 }
