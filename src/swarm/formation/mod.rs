@@ -291,7 +291,7 @@ impl Formation {
     ) {
         let leads: Vec<(usize, [f64; 2])> =
             (0..self.count()).filter_map(|m| Some((m, self.led_to(m, time)?))).collect();
-        let how = self.trim();
+        let (how, spacing) = (self.trim(), self.spacing);
         match &mut self.course {
             TargetSource::Recorded { steps, step } => {
                 *step = (*step + 1).min(steps.len() - 1);
@@ -319,8 +319,15 @@ impl Formation {
                         let places: Vec<(usize, [f64; 2])> = among.iter_mut().map(target).collect();
                         engine.observe(places);
                     }
+                    let largest_move = || match among.is_empty() {
+                        true => engine.movement().largest_move,
+                        false => {
+                            let moves = engine.present().iter().zip(engine.previous().iter());
+                            moves.map(|(to, from)| distance(to, from)).fold(0.0, f64::max) / spacing
+                        }
+                    };
                     // After the first sweep the leaders' move has reached their neighbours alone.
-                    if sweep > 0 && engine.movement().largest_move <= SETTLED {
+                    if sweep > 0 && largest_move() <= SETTLED {
                         break;
                     }
                 }
