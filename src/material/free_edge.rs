@@ -14,10 +14,8 @@ use crate::material::recovery::KnownTraction;
 /// Distances from sides to pieces that are computed at most: beyond, no stress is recovered.
 const MOST_DISTANCES: usize = 20_000_000;
 
-/// Sine of the turn to the right from which a corner is an inner one, where stress has no largest value.
-const INNER: f64 = -1e-6;
-
-/// Turn at inner corners up to which a polygon stands for a smooth curve: that of eleven corners around a hole \[rad\].
+/// Turn to the right from which a corner is an inner one, where stress has no largest value, and up to which a polygon stands for a
+/// smooth curve: that of eleven corners around a hole \[rad\].
 const CHORDS: f64 = 0.6;
 
 /// The outline of a body and what acts on it. The [`Edge`] is found on first use: tables and pictures of stress need
@@ -168,6 +166,5 @@ fn is_inner_corner(outline: &Outline, place: &Place) -> bool {
         1.0 => (place.piece, (place.piece + 1) % ring.len()),
         _ => return false,
     };
-    let (a, b) = (ring[before].tangent(1.0), ring[after].tangent(0.0));
-    a[0] * b[1] - a[1] * b[0] < INNER
+    turn_to_right(&ring[before], &ring[after]) >= CHORDS
 }

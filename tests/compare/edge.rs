@@ -71,6 +71,21 @@ fn a_body_force_leaves_the_recovery_of_the_stress_of_bending_as_it_is() {
     assert!((0..3).all(|k| (with[k] - without[k]).abs() < 1e-6), "{with:?} {without:?}");
 }
 
+/// A polygon stands for a smooth curve where it turns by little, into the body or out of it.
+#[test]
+fn stress_is_recovered_at_a_corner_that_hardly_turns() {
+    for height in [1.0001, 0.9999, 0.99] {
+        let shape = format!(
+            "body.shape={{ kind = \"polygon\", vertices = [[0.0, 0.0], [10.0, 0.0], [10.0, 1.0], [5.0, {height}], [0.0, 1.0]] }}"
+        );
+        let place = format!("record.places=[[5.0, {height}]]");
+        let left = "roles[0].region={ kind = \"outline\", pieces = [5] }";
+        let (found, cautions) = measured(BENT, &[&shape, &place, left]);
+        assert!((found[0][0] * height * height / 6.0 - 1.0).abs() < 0.03, "{height}: {found:?}");
+        assert!(cautions.is_empty(), "{height}: {cautions:?}");
+    }
+}
+
 const WEIGHTLESS: &str = "loads[1]={ kind = \"body\", force = [0.0, -1e-12] }";
 
 #[test]
@@ -377,5 +392,28 @@ fn energies_tell_the_error_of_conforming_cells_alone() {
         "lattice={kind=\"honeycomb\",spacing=0.2}",
     ] {
         assert_eq!(norm(other), None, "{other}");
+    }
+}
+
+/// A coupon cut off the axes of its material, pulled evenly: the rule is exact wherever it is pinned.
+#[test]
+fn a_region_that_takes_in_one_particle_holds_one_point_in_the_truth_too() {
+    let pinned = |region: &dyn Fn([f64; 2]) -> String| {
+        let text = format!(
+            "title = \"coupon\"\nlattice = {{ kind = \"square\", spacing = 0.5 }}\n\
+             body = {{ shape = {{ kind = \"rectangle\", max = [4.0, 2.0] }} }}\n\
+             material = {{ kind = \"orthotropic\", young = [9000.0, 700.0], poisson_12 = 0.3, shear = 500.0, angle = 25.0 }}\n\
+             rule = {{ mean = {{ kind = \"material\" }} }}\nequilibrium = {{}}\n\
+             loads = [{{ kind = \"traction\", region = {{ kind = \"edge\", side = \"right\" }}, traction = [2.0, 0.0] }}, \
+             {{ kind = \"traction\", region = {{ kind = \"edge\", side = \"left\" }}, traction = [-2.0, 0.0] }}]\n\
+             roles = [{{ region = {}, role = \"clamped\" }}, {{ region = {}, role = \"clamped\", axis = \"y\" }}]\n",
+            region([0.0, 0.0]),
+            region([4.0, 0.0]),
+        );
+        compare_scene(&scene(&text, &[])).unwrap_or_else(|error| panic!("{error}")).comparison
+    };
+    for radius in [0.3, 0.49, 1e-6] {
+        let found = pinned(&|at| format!("{{ kind = \"disc\", centre = {at:?}, radius = {radius:?} }}"));
+        assert!(found.displacement_rel_l2 < 1e-8 && found.von_mises_rel_l2 < 1e-8, "{radius}: {found}");
     }
 }

@@ -162,10 +162,11 @@ impl Picked<'_> {
         let (min, max) = bounds(all.iter().map(|&i| self.at(i)));
         let has_cell = self.has_whole_cell(all);
         let is_outer = all.iter().all(|&i| self.outline.nearest(self.at(i)).1 <= near);
-        let along = |selection: Selection| {
-            let portions = self.outline.portions(&selection, near);
+        let on = |selection: Selection| self.outline.portions(&selection, near);
+        let along = |portions: Vec<Portion>| {
             (is_outer && !portions.is_empty()).then_some(Holding::Portions(portions))
         };
+        let around = |centre| PlaneRegion::Disc { centre, radius: self.farthest(all, centre) };
         Ok(match known {
             Region::Boundary => Some(Holding::Portions(self.outline.portions(&Selection::All, near))),
             Region::Ids(_) => None,
@@ -174,12 +175,18 @@ impl Picked<'_> {
                 Some(Holding::Region(PlaneRegion::Box { min, max }))
             }
             Region::Edge { .. } if !is_outer => Some(Holding::Portions(on_outline()?)),
-            Region::Box { .. } | Region::Edge { .. } => along(Selection::Box { min, max }),
-            Region::Disc { centre, radius } if has_cell => {
-                Some(Holding::Region(PlaneRegion::Disc { centre: *centre, radius: *radius }))
+            Region::Box { .. } | Region::Edge { .. } => along(on(Selection::Box { min, max })),
+            Region::Disc { centre, .. } if has_cell => Some(Holding::Region(around(*centre))),
+            Region::Disc { centre, radius } => {
+                let within = on(Selection::Disc { centre: *centre, radius: *radius });
+                along(common(&within, &on(Selection::Box { min, max })))
             }
-            Region::Disc { centre, radius } => along(Selection::Disc { centre: *centre, radius: *radius }),
         })
+    }
+
+    /// The distance of the farthest of some particles from a point \[length\].
+    fn farthest(&self, particles: &[usize], from: Point) -> f64 {
+        particles.iter().map(|&i| distance(self.at(i), from)).fold(0.0, f64::max)
     }
 
     fn has_whole_cell(&self, particles: &[usize]) -> bool {
@@ -228,6 +235,15 @@ fn sides_within(cells: &Cells, inside: &BTreeSet<u32>) -> BTreeSet<[u32; 2]> {
     };
     let all = cells.iter().flat_map(of_cell).map(|[a, b]| [a.min(b), a.max(b)]);
     all.filter(|side| side.iter().all(|i| inside.contains(i))).collect()
+}
+
+/// The portions that two selections have in common.
+fn common(some: &[Portion], others: &[Portion]) -> Vec<Portion> {
+    let both = |a: &Portion, b: &Portion| {
+        let t = [a.t[0].max(b.t[0]), a.t[1].min(b.t[1])];
+        ((a.ring, a.piece) == (b.ring, b.piece) && t[0] <= t[1]).then(|| Portion { t, ..*a })
+    };
+    some.iter().flat_map(|a| others.iter().filter_map(move |b| both(a, b))).collect()
 }
 
 /// Portions of one piece that follow each other are one.
