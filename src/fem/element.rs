@@ -166,6 +166,14 @@ impl CellKind {
             CellKind::Quad9 => Rule::at(self, square_product(&GAUSS_2)),
         }
     }
+
+    /// The middle of the cell.
+    pub(crate) fn centre_rule(self) -> Rule {
+        match self.corners() {
+            4 => Rule::at(self, square_product(&GAUSS_1)),
+            _ => Rule::at(self, vec![([1.0 / 3.0, 1.0 / 3.0], 0.5)]),
+        }
+    }
 }
 
 /// Shape functions N and their derivatives along xi and eta at one reference point; entries past the

@@ -6,6 +6,7 @@
 //! Numer. Meth. Engng 33 (1992) 1331-1364. Patches at the boundary, too small for the fit, are grown by
 //! the next ring of cells.
 
+use super::element::Rule;
 use super::material::Stress;
 use super::mesh::Mesh;
 use super::solution::Solution;
@@ -34,8 +35,13 @@ impl Solution {
 
     /// The same of a mesh whose cells share nodes with cells of their own material alone.
     pub(super) fn recovered_stress(&self) -> Vec<Stress> {
+        self.recovered_from(&self.mesh().kind().stress_rule())
+    }
+
+    /// The same from other points of the cells.
+    pub(super) fn recovered_from(&self, rule: &Rule) -> Vec<Stress> {
         let mesh = self.mesh();
-        let samples = self.samples();
+        let samples = self.samples(rule);
         let (starts, cells) = mesh.cells_of_nodes();
         let around = |node: usize| &cells[starts[node] as usize..starts[node + 1] as usize];
         let mut sums = vec![([0.0; 4], 0.0); mesh.node_count()];
@@ -55,12 +61,12 @@ impl Solution {
     }
 
     /// The samples of each cell, shape \[cells\]\[points\].
-    fn samples(&self) -> Vec<Vec<Sample>> {
-        let (mesh, rule) = (self.mesh(), self.mesh().kind().stress_rule());
+    fn samples(&self, rule: &Rule) -> Vec<Vec<Sample>> {
+        let mesh = self.mesh();
         let of_cell = |cell: usize| {
             let at = mesh.positions(cell);
             let points = rule.points.iter().map(|(s, _)| s.interpolate(&at[..mesh.kind().nodes()]));
-            points.zip(self.stress_in(cell, &rule).map(|s| [s.xx, s.yy, s.xy, s.zz])).collect()
+            points.zip(self.stress_in(cell, rule).map(|s| [s.xx, s.yy, s.xy, s.zz])).collect()
         };
         (0..mesh.cell_count()).map(of_cell).collect()
     }

@@ -296,9 +296,11 @@ impl ShapeSolution {
 }
 
 /// At the nodes of a mesh whose cells share nodes with cells of their own material alone: where materials meet there is a
-/// boundary for either.
+/// boundary for either. On boundaries it is that of the cells there, but for its mean, which is recovered from the middles of the cells
+/// around: a cell that can hardly change its volume has the right pressure in its middle alone.
 fn nodal_stress(parted: &Solution) -> Vec<Stress> {
     let (mesh, mut stress) = (parted.mesh(), parted.recovered_stress());
+    let of_middles = parted.recovered_from(&mesh.kind().centre_rule());
     let mut sums: BTreeMap<u32, (Stress, f64)> = BTreeMap::new();
     for side in mesh.boundary() {
         for local in mesh.kind().side_nodes(side.side as usize) {
@@ -310,8 +312,10 @@ fn nodal_stress(parted: &Solution) -> Vec<Stress> {
             *count += 1.0;
         }
     }
-    for (node, (Stress { xx, yy, xy, zz }, n)) in sums {
-        stress[node as usize] = Stress { xx: xx / n, yy: yy / n, xy: xy / n, zz: zz / n };
+    for (node, (Stress { xx, yy, xy, .. }, n)) in sums {
+        let middle = of_middles[node as usize];
+        let (apart, mean) = (0.5 * (xx - yy) / n, 0.5 * (middle.xx + middle.yy));
+        stress[node as usize] = Stress { xx: mean + apart, yy: mean - apart, xy: xy / n, zz: middle.zz };
     }
     stress
 }

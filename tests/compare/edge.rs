@@ -10,7 +10,7 @@ use flockform::continuum::report::PlanReport;
 use flockform::scene::Scene;
 use flockform::solve::equilibrium::Solver;
 
-use crate::support::compare_scene;
+use crate::support::{compare_scene, compared};
 
 fn scene(text: &str, overrides: &[&str]) -> Scene {
     let overrides: Vec<String> = overrides.iter().map(|&text| text.to_owned()).collect();
@@ -415,5 +415,21 @@ fn a_region_that_takes_in_one_particle_holds_one_point_in_the_truth_too() {
     for radius in [0.3, 0.49, 1e-6] {
         let found = pinned(&|at| format!("{{ kind = \"disc\", centre = {at:?}, radius = {radius:?} }}"));
         assert!(found.displacement_rel_l2 < 1e-8 && found.von_mises_rel_l2 < 1e-8, "{radius}: {found}");
+    }
+}
+
+/// Lamé's stress does not depend on Poisson's ratio; where the volume hardly changes, the pressure of a single cell is its own.
+#[test]
+fn the_truth_has_lames_stress_on_lines_of_symmetry_at_any_poisson_ratio() {
+    for poisson in [0.3, 0.49, 0.4999] {
+        let poisson = format!("material.poisson={poisson}");
+        let found = compared("ring", &[&poisson, "record.places=[[7.0, 0.0], [0.0, 7.0]]"]);
+        for (at, axis) in found.places.iter().zip([0, 1]) {
+            let [radial, hoop] = [at.truth.stress[axis], at.truth.stress[1 - axis]];
+            assert!(
+                (radial + 1.98251).abs() < 0.02 && (hoop - 5.79203).abs() < 0.02,
+                "{poisson}: {radial} {hoop}"
+            );
+        }
     }
 }
