@@ -59,7 +59,7 @@ const SERIES: [Series; 21] = [
     Series { faults: STOPS, loss: 0.7, ..SOUND },
     Series { faults: STOPS, delay: 3, loss: 0.5, ..SOUND },
     Series { model: SINGLE, faults: STOPS, delay: 3, loss: 0.5, ..SOUND },
-    Series { model: SINGLE, faults: STOPS, delay: 3, noise: 0.02, loss: 0.5, ..SOUND },
+    Series { model: SINGLE, faults: STOPS, delay: 3, noise: 0.02, loss: 0.5 },
 ];
 
 /// A swarm file: 2 to 9 robots in places that keep the clearance, each led to one random place after another,

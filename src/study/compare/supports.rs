@@ -241,7 +241,7 @@ fn sides_within(cells: &Cells, inside: &BTreeSet<u32>) -> BTreeSet<[u32; 2]> {
 fn common(some: &[Portion], others: &[Portion]) -> Vec<Portion> {
     let both = |a: &Portion, b: &Portion| {
         let t = [a.t[0].max(b.t[0]), a.t[1].min(b.t[1])];
-        ((a.ring, a.piece) == (b.ring, b.piece) && t[0] <= t[1]).then(|| Portion { t, ..*a })
+        ((a.ring, a.piece) == (b.ring, b.piece) && t[0] <= t[1]).then_some(Portion { t, ..*a })
     };
     some.iter().flat_map(|a| others.iter().filter_map(move |b| both(a, b))).collect()
 }
