@@ -179,7 +179,7 @@ fn lost_late_and_doubled_poses_change_the_way_and_not_the_end() {
 
 /// Every sweep of a period leaves it out, not the last alone.
 #[test]
-fn a_liar_or_a_lost_robot_moves_nobody_however_many_sweeps_a_period_has() {
+fn a_liar_or_a_lost_robot_moves_no_other_however_many_sweeps_a_period_has() {
     let lie = "flight.faults=[{ robot = \"robot_13\", at = 1.0, what = { kind = \"offset\", by = [100.0, -100.0] } }]";
     let silent = "flight.faults=[{ robot = \"robot_13\", at = 1.0, what = { kind = \"silent\" } }]";
     for sweeps in [1, 2, 5] {
