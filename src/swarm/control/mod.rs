@@ -636,7 +636,7 @@ impl Control {
         if self.max_faulty > 0 {
             return self.formation.moved_together(self.program_time());
         }
-        let is_lost = |m: usize| self.formation.leads(m) && !self.usable[m];
+        let is_lost = |m: usize| self.formation.leads(m) && self.known[m] && !self.usable[m];
         let any_lost = (0..self.formation.count()).any(is_lost);
         (!any_lost).then(|| self.formation.settled(present)).flatten()
     }
