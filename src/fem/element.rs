@@ -132,7 +132,7 @@ impl CellKind {
     /// Points and weights that integrate the stiffness of a straight-sided, parallelogram cell exactly.
     pub(crate) fn stiffness_rule(self) -> Rule {
         match self {
-            CellKind::Tri3 => Rule::at(self, vec![([1.0 / 3.0; 2], 0.5)]),
+            CellKind::Tri3 => self.centre_rule(),
             CellKind::Tri6 => Rule::at(self, triangle_degree_4()),
             CellKind::Quad4 => Rule::at(self, square_product(&GAUSS_2)),
             CellKind::Quad9 => Rule::at(self, square_product(&GAUSS_3)),
@@ -157,8 +157,7 @@ impl CellKind {
     /// Source: J. Barlow, Int. J. Numer. Meth. Engng 10 (1976) 243-251.
     pub(crate) fn stress_rule(self) -> Rule {
         match self {
-            CellKind::Tri3 => self.stiffness_rule(),
-            CellKind::Quad4 => Rule::at(self, square_product(&GAUSS_1)),
+            CellKind::Tri3 | CellKind::Quad4 => self.centre_rule(),
             CellKind::Tri6 => {
                 let (a, b) = (1.0 / 6.0, 2.0 / 3.0);
                 Rule::at(self, [[a, a], [b, a], [a, b]].map(|p| (p, a)).to_vec())
@@ -171,7 +170,7 @@ impl CellKind {
     pub(crate) fn centre_rule(self) -> Rule {
         match self.corners() {
             4 => Rule::at(self, square_product(&GAUSS_1)),
-            _ => Rule::at(self, vec![([1.0 / 3.0, 1.0 / 3.0], 0.5)]),
+            _ => Rule::at(self, vec![([1.0 / 3.0; 2], 0.5)]),
         }
     }
 }

@@ -69,12 +69,8 @@ impl Table<'_> {
             let levels: Vec<&Level> = self.rows.keys().map(|&run| &self.design.runs[run][k]).collect();
             Column::of_levels(&self.design.factors[k], &levels)
         };
-        let output = |n: usize| {
-            let value = |row: &Row| row.outputs.get(n).and_then(|text| text.parse::<f64>().ok());
-            let values = self.rows.values().map(value).collect();
-            Column { name: self.outputs[n].clone(), is_log: false, values, categories: Vec::new() }
-        };
-        let all: Vec<Column> = (0..self.outputs.len()).map(output).filter(Column::has_numbers).collect();
+        let all: Vec<Column> =
+            (0..self.outputs.len()).map(|n| self.column(n)).filter(Column::has_numbers).collect();
         let is_asked = |column: &&Column| match plotted {
             Some(name) => column.name == name,
             None => column.varies(),
@@ -89,12 +85,17 @@ impl Table<'_> {
         })
     }
 
+    /// The numbers of an output.
+    fn column(&self, n: usize) -> Column {
+        let value = |row: &Row| row.outputs.get(n).and_then(|text| text.parse::<f64>().ok());
+        let values = self.rows.values().map(value).collect();
+        Column { name: self.outputs[n].clone(), is_log: false, values, categories: Vec::new() }
+    }
+
     /// Whether any run has a number for this output.
     pub fn has_numbers(&self, output: &str) -> bool {
-        let is_number =
-            |row: &Row, n: usize| row.outputs.get(n).is_some_and(|text| text.parse::<f64>().is_ok());
         let at = self.outputs.iter().position(|name| name == output);
-        at.is_some_and(|n| self.rows.values().any(|row| is_number(row, n)))
+        at.is_some_and(|n| self.column(n).has_numbers())
     }
 }
 

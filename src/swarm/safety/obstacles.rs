@@ -273,17 +273,16 @@ impl Obstacles {
         );
         let mut within = Vec::new();
         self.find_solids(place, &mut within);
+        let mut deepest = border.map_or(f64::INFINITY, |(_, Distance(distance))| distance);
+        if deepest >= 0.0 && !within.contains(&true) {
+            return deepest;
+        }
         // Of several solids around it the deepest counts.
         let mut depths = vec![f64::INFINITY; within.len()];
-        let mut deepest = border.map_or(f64::INFINITY, |(_, Distance(distance))| distance);
-        if deepest < 0.0 || within.contains(&true) {
-            for piece in &self.pieces {
-                match piece {
-                    Piece::Edge { outline, .. } => {
-                        depths[*outline] = depths[*outline].min(piece.distance(here))
-                    }
-                    Piece::Disc { .. } => deepest = deepest.min(piece.distance(here)),
-                }
+        for piece in &self.pieces {
+            match piece {
+                Piece::Edge { outline, .. } => depths[*outline] = depths[*outline].min(piece.distance(here)),
+                Piece::Disc { .. } => deepest = deepest.min(piece.distance(here)),
             }
         }
         let depths = depths.iter().zip(&within).filter(|(_, within)| **within);
