@@ -61,22 +61,23 @@ pub fn require(scene: &Scene, bytes: f64) -> Result<(), SceneError> {
     }
 }
 
+/// Bytes from which an array is large, and has pages of its own \[B\].
+#[cfg(target_os = "linux")]
+const LARGE: usize = 1 << 17;
+
 /// Has large arrays go back to the system when they are dropped. glibc keeps those that are smaller than one that was dropped
 /// before, and what it keeps lies in pieces: an equilibrium of 432,000 particles took 12 % more at its largest. What solves
 /// again and again is faster without.
 pub fn return_what_is_dropped() {
-    /// Bytes from which an array has pages of its own.
-    #[cfg(all(feature = "ros", target_env = "gnu"))]
-    const LARGE: libc::c_int = 1 << 17;
     // SAFETY: the call sets a number of the allocator; no other thread runs yet.
     #[cfg(all(feature = "ros", target_env = "gnu"))]
     unsafe {
-        libc::mallopt(libc::M_MMAP_THRESHOLD, LARGE);
+        libc::mallopt(libc::M_MMAP_THRESHOLD, LARGE as libc::c_int);
     }
 }
 
-/// The system's allocator, but for arrays: those of a page or more begin at a line of the caches, and for those as long as a large page
-/// it asks for large pages: the system sets up a page when it is first touched, and many give large ones only to what asks. A run of
+/// The system's allocator, but for large arrays: they begin at a line of the caches, and for those as long as a large page it asks for
+/// large pages: the system sets up a page when it is first touched, and many give large ones only to what asks. A run of
 /// 1.1 million particles touches 176,000 pages for the first time instead of 354,000 (`perf stat -e page-faults flockform run`, AMD
 /// EPYC, 26 November 2026).
 #[cfg(target_os = "linux")]
@@ -89,12 +90,13 @@ impl ArrayAllocator {
 
     /// Bytes of a line of the caches \[B\]. A sweep stores whole lines, and reads across two where what it reads begins elsewhere in a
     /// line: with arrays that begin with one, bodies of 256 and 1024 squared are swept 1.3 and 1.4 times as fast (16 steps together,
-    /// one thread, alternated, Intel Xeon with AVX-512, 28 November 2026).
+    /// one thread, alternated, Intel Xeon with AVX-512, 28 November 2026). Smaller arrays lie together in pages, where what is
+    /// left in front of a line stays in pieces: the frames of a body of 1,252 particles took 3 MB more.
     const LINE: usize = 64;
 
     /// Whether it is an array, which the C library's own functions serve here.
     fn is_array(layout: Layout) -> bool {
-        layout.size() >= Self::PAGES[1] && layout.align() <= align_of::<libc::max_align_t>()
+        layout.size() >= LARGE && layout.align() <= align_of::<libc::max_align_t>()
     }
 
     fn asked(array: *mut u8, bytes: usize) -> *mut u8 {
@@ -237,7 +239,7 @@ mod tests {
     fn arrays_begin_at_a_line_of_the_caches_and_hold_what_was_in_them_whatever_becomes_of_their_size() {
         let alloc = ArrayAllocator;
         let layout = |bytes| Layout::from_size_align(bytes, 8).expect("small");
-        let sizes = [24, 4088, 4096, 70_000, 3 << 20, 4104, 40, 5 << 20, 4096, 8];
+        let sizes = [24, LARGE - 8, LARGE, 170_000, 3 << 20, LARGE + 8, 40, 5 << 20, LARGE, 8];
         // SAFETY: each array is made, written, read, moved and freed with the layout that it has.
         unsafe {
             for zeroed in [false, true] {
@@ -246,7 +248,7 @@ mod tests {
                 let mut before = 8;
                 for bytes in sizes {
                     let made = alloc.alloc(layout(bytes));
-                    assert!(bytes < 4096 || made.addr().is_multiple_of(64), "{bytes}");
+                    assert!(bytes < LARGE || made.addr().is_multiple_of(64), "{bytes}");
                     alloc.dealloc(made, layout(bytes));
                     let made = alloc.alloc_zeroed(layout(bytes));
                     assert_eq!((made.read(), made.add(bytes - 1).read()), (0, 0));

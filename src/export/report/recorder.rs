@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 
 use super::super::bonds::pairs;
 use super::encode::GROUP;
-use super::encoded;
 use super::frames::{Channel, Frame, Frames};
 use super::sample::{self, Sample};
 use super::view::{Animation, Clock, Quantity, Stress, View};
+use super::{MOST_TEXT, encoded};
 use crate::continuum::mechanics::Stresses;
 use crate::continuum::memory::{measured, neighbour_entries};
 use crate::continuum::plan::Plan;
@@ -94,6 +94,8 @@ pub(in crate::export) fn packed(scene: &Scene, plan: &Plan) -> Packed {
     /// Bytes of its numbers at the end as text; where nothing has come yet, they are next to nothing too.
     const EXACT: usize = 20;
     const EXACT_WITH_STRESS: usize = 80;
+    /// Bytes of frames that one of their text stands for: three of a body that moves everywhere, many of one mostly at rest.
+    const COMPRESSED: usize = 6;
     let (total, is_sample) = (plan.setup.body.total(), plan.setup.body.part.is_some());
     let count = if is_sample { sample::size_of(total) } else { total };
     let are_neighbours_known = !is_sample && plan.setup.present_radius.is_none();
@@ -114,11 +116,14 @@ pub(in crate::export) fn packed(scene: &Scene, plan: &Plan) -> Packed {
     let bonds = if is_sample { 0 } else { 8 * neighbour_entries(plan) / 2 };
     let kept = frames.of_steps(steps);
     let at_once = rayon::current_num_threads().min(kept[1].div_ceil(GROUP));
+    let of_frames = kept.map(|kept| kept * frames.bytes_of_one());
+    let moving = (of_frames[1] / COMPRESSED).min(MOST_TEXT);
+    let packing = exact.max(bonds).max((text + at_once * 4 * (2 * frames.channels.len() + 1)) * count);
     Packed {
         values: 8 * frames.channels.len() * count,
-        frames: kept.map(|kept| kept * frames.bytes_of_one()),
-        packing: exact.max(bonds).max((text + at_once * 4 * (2 * frames.channels.len() + 1)) * count),
-        text: text * count,
+        frames: of_frames,
+        packing: packing + moving,
+        text: text * count + moving,
     }
 }
 
