@@ -7,6 +7,7 @@ use super::plan::Plan;
 use super::run::require_shareable;
 use crate::engine::setup::Setup;
 use crate::engine::several::looks_at_every_step;
+use crate::engine::shared::seen_in_a_step;
 use crate::flock::part::Part;
 use crate::scene::{Scene, SceneError};
 use crate::solve::corotated::is_corotated;
@@ -108,7 +109,10 @@ impl PartShares {
         // Bonds that are broken may be those of other parts.
         let looks = flock.bonds.is_some() || looks_at_every_step(false, flock, changes);
         let takes_several = !looks && sweep.takes_several(body.frame.as_ref());
-        let needs = |domain: &mut Domain| domain.needs(takes_several).most(usize::from(probes.is_some()));
+        let seen = seen_in_a_step(body, &flock.neighbours);
+        let needs = |domain: &mut Domain| {
+            domain.needs(takes_several, seen.clone()).most(usize::from(probes.is_some()))
+        };
         sweep.domain_mut().map_or((0, 0), needs)
     }
 

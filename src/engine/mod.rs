@@ -47,6 +47,7 @@ use movement::Movement;
 use path::Path;
 use probes::ProbeSeries;
 use setup::{Conduct, RoleChange, Setup};
+use shared::Known;
 pub(crate) use undo::Before;
 
 /// A body on its way; positions in \[length, world frame\], shape \[count\].
@@ -96,8 +97,8 @@ pub struct Engine {
     probes: Option<Vec<ProbeSeries>>,
     /// The ranks that share the body.
     team: Option<(Team, Share)>,
-    /// Whether the positions of all particles are known here; of a shared body, otherwise, those of its own.
-    is_whole: bool,
+    /// Which positions are known here, where ranks share the body.
+    known: Known,
 }
 
 /// Buffers of a neighbourhood that is found anew at every step.
@@ -166,7 +167,7 @@ impl Engine {
             path: None,
             probes: None,
             team: None,
-            is_whole: true,
+            known: Known::All,
         };
         engine.follow_ramp();
         // The plan has given the roles that hold from the start; their motions begin here.
@@ -293,7 +294,7 @@ impl Engine {
             self.advance_by(1, None);
             return;
         }
-        self.gather();
+        self.gather_seen();
         if let Some(before) = before.as_deref_mut().filter(|_| self.acts_next()) {
             before.note_all(self);
         }

@@ -2,7 +2,7 @@
 
 use super::leaders::Led as Leader;
 use super::movement::Movement;
-use super::shared::take_steps;
+use super::shared::{Known, take_steps};
 use super::{Before, Engine};
 use crate::engine::setup::RoleChange;
 use crate::flock::law::Flock;
@@ -73,7 +73,7 @@ impl StepBatch {
             let may_diverge = |reach| self.may_diverge(engine, reach, 1);
             self.is_noted = engine.steps_at_once(1) == 0 || self.reach.is_none_or(may_diverge);
             if self.is_noted {
-                engine.gather();
+                engine.gather_seen();
                 engine.advance_noting(&mut self.before);
             } else {
                 engine.advance();
@@ -136,14 +136,18 @@ impl Engine {
             let led = Led { particles: &self.led, places: &self.leaders_ahead(each) };
             let frame = self.body.frame.as_ref();
             let steps = self.sweep.steps_to_take(&self.flock, frame, (each, led, farther), beyond);
-            let ranks = self.team.as_ref().zip(self.sweep.domain()).filter(|_| taken == 0 && !self.is_whole);
+            let ranks = self
+                .team
+                .as_ref()
+                .zip(self.sweep.domain())
+                .filter(|_| taken == 0 && self.known != Known::All);
             let halo = ranks.map(|((team, _), domain)| (team, domain.halo(count + spare)));
             let places = [&mut self.present, &mut self.previous];
             moved.extend(take_steps(&steps, (halo, beyond), places, &mut self.activity));
             if each % 2 == 1 {
                 std::mem::swap(&mut self.present, &mut self.previous);
             }
-            self.is_whole = self.team.is_none();
+            self.forget_others();
             self.step += each;
             self.record_probes();
         }
@@ -158,7 +162,7 @@ impl Engine {
         self.forget_probes_after(step);
         self.follow_ramp();
         self.present.clone_from(places);
-        self.is_whole = self.team.is_none();
+        self.forget_others();
         self.activity = activity;
         self.activity.forget();
     }

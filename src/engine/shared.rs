@@ -27,6 +27,17 @@ use crate::sweep::caches::Caches;
 use crate::sweep::domain::{Domain, Halo, Held, Needs, Share};
 use crate::sweep::{Activity, Order, Stage, Steps};
 
+/// The particles whose positions a rank knows, now and before the last step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Known {
+    /// Its own.
+    Own,
+    /// Those as well that its own see in a step that is taken by itself.
+    Seen,
+    /// All that stand there.
+    All,
+}
+
 /// A sweep that ranks cannot share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("a sequential sweep moves one particle after the other and cannot be shared by ranks")]
@@ -60,12 +71,12 @@ impl Engine {
     /// a part those of all particles that stand there. Every rank must call it at the same step.
     pub fn gather(&mut self) {
         let (Some((team, _)), Some(domain)) = (&self.team, self.sweep.domain()) else { return };
-        if self.is_whole {
+        if self.known == Known::All {
             return;
         }
+        self.known = Known::All;
         if self.body.part.is_some() {
-            receive(team, domain, 0, [&mut self.present, &mut self.previous]);
-            self.is_whole = true;
+            receive(team, &domain.halo(0), [&mut self.present, &mut self.previous]);
             let counts = team.sum(self.activity.take_counts());
             if team.is_first() {
                 self.activity.add_counts(counts);
@@ -74,20 +85,39 @@ impl Engine {
         }
         let of_ranks =
             gather_points(team, domain, [&mut self.present, &mut self.previous], self.activity.take_counts());
-        self.is_whole = true;
         if team.is_first() {
             of_ranks.into_iter().for_each(|counts| self.activity.add_counts(counts));
         }
     }
 
-    /// One step of a body whose positions are all known: each rank moves its own, and then all are known again, the next
-    /// ones in `previous`.
+    /// Makes the positions known that the particles of this rank see in a step that is taken by itself. Every rank must call it at
+    /// the same step.
+    pub(super) fn gather_seen(&mut self) {
+        if self.body.part.is_none() {
+            self.gather();
+        } else if self.known == Known::Own {
+            let (Some((team, _)), Some(domain)) = (&self.team, self.sweep.domain()) else { return };
+            receive(team, &domain.halo_of_a_step(), [&mut self.present, &mut self.previous]);
+            self.known = Known::Seen;
+        }
+    }
+
+    /// Notes that the ranks have moved on, each its own particles.
+    pub(super) fn forget_others(&mut self) {
+        self.known = if self.team.is_some() { Known::Own } else { Known::All };
+    }
+
+    /// One step of a body of which the positions are known that each rank's particles see: each moves its own, and then these are
+    /// known again, the next ones in `previous`.
     pub(super) fn step_shared(&mut self) {
         self.sweep.step(&self.flock, None, &self.present, &mut self.previous);
         if let (Some((team, _)), Some(domain)) = (&self.team, self.sweep.domain()) {
             match self.body.part {
                 None => drop(gather_points(team, domain, [&mut self.previous], [0; 2])),
-                Some(_) => receive(team, domain, 0, [&mut self.previous]),
+                Some(_) => {
+                    receive(team, &domain.halo_of_a_step(), [&mut self.previous]);
+                    self.known = Known::Seen;
+                }
             }
         }
         if let Some(frame) = &self.body.frame {
@@ -114,9 +144,9 @@ impl Engine {
     /// Learns what the other ranks move and need; to be called by all of them when the sweep is compiled.
     pub(super) fn agree_on_needs(&mut self) {
         let (Some((team, _)), Some(_)) = (&self.team, &self.body.part) else { return };
-        let takes_several = self.takes_several;
+        let (takes_several, seen) = (self.takes_several, seen_in_a_step(&self.body, &self.flock.neighbours));
         let Some(domain) = self.sweep.domain_mut() else { return };
-        let own = domain.needs(takes_several).words();
+        let own = domain.needs(takes_several, seen).words();
         domain.learn(team.each(own).iter().map(Needs::of_words).collect());
         self.takes_several = domain.steps_together() > 0;
     }
@@ -276,11 +306,16 @@ pub(crate) fn of_all_parts(
     all.collect()
 }
 
-/// Receives what is needed of others before so many steps.
-fn receive<const N: usize>(team: &Team, domain: &Domain, steps: usize, mut points: [&mut Vectors; N]) {
-    let halo = domain.halo(steps);
-    let (sent, sizes) = messages(&halo, &points.each_ref().map(|points| &**points));
-    put_all(&halo, &team.swap(&sent, &sizes), &mut points);
+/// The particles that those of a part see in a step that is taken by itself, as numbers of those that stand here; all of these where
+/// points of a frame see some as well.
+pub(crate) fn seen_in_a_step(body: &Body, neighbours: &Neighbours) -> Range<usize> {
+    if body.frame.is_some() { 0..body.count() } else { neighbours.seen_from(body.owned()) }
+}
+
+/// Receives positions of others.
+fn receive<const N: usize>(team: &Team, halo: &Halo, mut points: [&mut Vectors; N]) {
+    let (sent, sizes) = messages(halo, &points.each_ref().map(|points| &**points));
+    put_all(halo, &team.swap(&sent, &sizes), &mut points);
 }
 
 /// What is sent, and how many words are received: (rank, words).

@@ -95,7 +95,7 @@ impl Engine {
         self.move_components();
         self.find_neighbours_of_last_step();
         self.forget_probes_after(step);
-        self.is_whole = self.team.is_none();
+        self.forget_others();
         (self.settled, self.activity) = (settled, activity);
         self.activity.forget();
     }

@@ -1,6 +1,7 @@
 //! The neighbours whose positions a particle sees (the paper's Choice 2).
 
 use std::f64::consts::PI;
+use std::ops::Range;
 
 use super::grid::CellGrid;
 use super::lattice::{Lattice, Site, ring};
@@ -209,13 +210,21 @@ impl Neighbours {
     }
 
     /// Where the bonds of `particle` lie in `index` and in every array parallel to it.
-    pub fn bonds(&self, particle: usize) -> std::ops::Range<usize> {
+    pub fn bonds(&self, particle: usize) -> Range<usize> {
         self.starts[particle] as usize..self.starts[particle + 1] as usize
     }
 
     /// The particles that `particle` sees, in summation order.
     pub fn of(&self, particle: usize) -> &[u32] {
         &self.index[self.bonds(particle)]
+    }
+
+    /// The stretch of the numbering that holds these particles and all that they see.
+    pub(crate) fn seen_from(&self, particles: Range<usize>) -> Range<usize> {
+        let bonds = self.starts[particles.start] as usize..self.starts[particles.end] as usize;
+        let seen = |(start, end): (usize, usize), &k: &u32| (start.min(k as usize), end.max(k as usize + 1));
+        let (start, end) = self.index[bonds].iter().fold((particles.start, particles.end), seen);
+        start..end
     }
 
     /// Rebuilds the lists as those of the `members` within `radius` now, in order of index.

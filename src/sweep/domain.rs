@@ -71,32 +71,34 @@ pub struct Needs {
     owned: Range<usize>,
     /// Most steps that it can take together; 0 where it looks at each.
     steps: usize,
+    /// The particles that it sees when it takes a step by itself, its own among them.
+    seen: Range<usize>,
     /// The particles that it needs for so many steps, its own among them; number 0 is all that it has. Shape
     /// \[[`MOST_STEPS`] + 1\].
     needed: Vec<Range<usize>>,
 }
 
 /// Words of [`Needs::words`].
-pub(crate) const NEED_WORDS: usize = 3 + 2 * (MOST_STEPS + 1);
+pub(crate) const NEED_WORDS: usize = 5 + 2 * (MOST_STEPS + 1);
 
 impl Needs {
     fn of(owned: Range<usize>, all: Range<usize>) -> Self {
         let all = if owned.is_empty() { 0..0 } else { all };
-        Self { owned, steps: 0, needed: vec![all; MOST_STEPS + 1] }
+        Self { owned, steps: 0, seen: all.clone(), needed: vec![all; MOST_STEPS + 1] }
     }
 
     /// Most steps together, if so many bands are to be known beyond those that they need, and how many particles of others all
-    /// that is; of a rank that looks at each step all that it has.
+    /// that is; of a rank that looks at each step those that it sees.
     pub fn most(&self, spare: usize) -> (usize, usize) {
         let steps = self.steps.saturating_sub(spare);
-        let needed = if steps == 0 { 0 } else { self.steps };
-        (steps, self.needed[needed].len() - self.owned.len())
+        let needed = if steps == 0 { &self.seen } else { &self.needed[self.steps] };
+        (steps, needed.len() - self.owned.len())
     }
 
     /// For another rank.
     pub fn words(&self) -> [u64; NEED_WORDS] {
         let ends = |of: &Range<usize>| [of.start as u64, of.end as u64];
-        let own = ends(&self.owned).into_iter().chain([self.steps as u64]);
+        let own = [&self.owned, &self.seen].into_iter().flat_map(ends).chain([self.steps as u64]);
         let mut words = own.chain(self.needed.iter().flat_map(ends));
         std::array::from_fn(|_| words.next().unwrap_or_default())
     }
@@ -104,8 +106,8 @@ impl Needs {
     /// Of another rank.
     pub(crate) fn of_words(words: &[u64; NEED_WORDS]) -> Self {
         let range = |ends: &[u64]| ends[0] as usize..ends[1] as usize;
-        let needed = words[3..].chunks_exact(2).map(range).collect();
-        Self { owned: range(&words[..2]), steps: words[2] as usize, needed }
+        let needed = words[5..].chunks_exact(2).map(range).collect();
+        Self { owned: range(&words[..2]), seen: range(&words[2..4]), steps: words[4] as usize, needed }
     }
 }
 
@@ -187,11 +189,14 @@ impl Domain {
         Self { rank: share.rank, first, bands: 0..0, shares }
     }
 
-    /// What this rank moves and needs, for the others to know.
-    pub fn needs(&mut self, takes_several: bool) -> &Needs {
+    /// What this rank moves and needs, for the others to know, if its particles see these of those that stand here.
+    pub fn needs(&mut self, takes_several: bool, seen: Range<usize>) -> &Needs {
         let needs = &mut self.shares[self.rank];
         if !takes_several {
             needs.steps = 0;
+        }
+        if !needs.owned.is_empty() {
+            needs.seen = self.first + seen.start..self.first + seen.end;
         }
         needs
     }
@@ -232,11 +237,20 @@ impl Domain {
 
     /// The exchange before so many steps are taken together; before 0 steps, of all that a rank has of others.
     pub fn halo(&self, steps: usize) -> Halo {
+        self.halo_of(|share| &share.needed[steps])
+    }
+
+    /// The exchange before a step that is taken by itself.
+    pub fn halo_of_a_step(&self) -> Halo {
+        self.halo_of(|share| &share.seen)
+    }
+
+    fn halo_of(&self, needed: impl Fn(&Needs) -> &Range<usize>) -> Halo {
         let others = (0..self.shares.len()).filter(|&rank| rank != self.rank);
         let mut halo = Halo::default();
         for other in others {
-            let sent = meet(&self.shares[other].needed[steps], &self.of(self.rank));
-            let received = meet(&self.shares[self.rank].needed[steps], &self.of(other));
+            let sent = meet(needed(&self.shares[other]), &self.of(self.rank));
+            let received = meet(needed(&self.shares[self.rank]), &self.of(other));
             halo.sends.extend(sent.map(|particles| (other, self.here(&particles))));
             halo.receives.extend(received.map(|particles| (other, self.here(&particles))));
         }
