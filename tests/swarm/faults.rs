@@ -205,6 +205,41 @@ fn a_liar_or_a_lost_robot_moves_no_other_however_many_sweeps_a_period_has() {
     }
 }
 
+/// Points of a frame copy robots beside them: a liar would have a vote more with each of them, and one that is lost would go on
+/// through them.
+#[test]
+fn what_a_frame_copies_of_a_liar_or_of_a_lost_robot_moves_no_other() {
+    let framed = |frame: &str, radius: u32, shape: &str, leaders: &str, more: &str| {
+        let text = format!(
+            "title = \"framed\"\nradius = 0.1\nlattice = {{ kind = \"square\", spacing = 1.0 }}\nframe = \"{frame}\"\n\
+             body = {{ shape = {{ kind = \"grid\", {shape} }} }}\nneighbours = {{ kind = \"chebyshev\", radius = {radius} }}\n\
+             leaders = [{{ region = {{ kind = \"ids\", ids = [{leaders}] }}, program = {{ kind = \"path\", points = \
+             [{{ at = 5.0, displacement = [0.0, 4.0] }}] }} }}]\nlimits = {{ speed = 3.0 }}\n{more}"
+        );
+        let mut flight =
+            Flight::new(&parse(&text).expect("a swarm")).unwrap_or_else(|error| panic!("{error}"));
+        fly(&mut flight, 1200);
+        let (places, formation) = (flight.fleet().places(), flight.control().formation());
+        let faulty = formation.number("robot_3").expect("there");
+        let apart = |m: usize| {
+            let [x, y] = formation.places.get(m);
+            distance(places.get(m), [x, y + 4.0])
+        };
+        let worst = (0..formation.count()).filter(|&m| m != faulty).map(apart).fold(0.0, f64::max);
+        assert!(worst < 1e-6, "{frame}, {more}: {worst}");
+    };
+    for frame in ["lagged", "immediate", "mirror"] {
+        let silent = "flight.faults = [{ robot = \"robot_3\", at = 1.0, what = { kind = \"silent\" } }]";
+        framed(frame, 1, "columns = 5, rows = 5", "9, 13, 37, 41", silent);
+        for what in ["{ kind = \"offset\", by = [0.0, -3.0] }", "{ kind = \"stuck\" }"] {
+            let lie = format!(
+                "resilience = {{ max_faulty_neighbours = 1 }}\nflight.faults = [{{ robot = \"robot_3\", at = 1.0, what = {what} }}]"
+            );
+            framed(frame, 2, "columns = 7, rows = 7", "25, 26, 31, 36, 91, 92, 97, 96, 58, 64, 61", &lie);
+        }
+    }
+}
+
 #[test]
 fn weights_below_zero_cannot_leave_out_liars() {
     let overrides = [

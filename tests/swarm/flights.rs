@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use flockform::flock::vectors::{Vectors, distance};
 use flockform::scene::bundled::SWARMS;
 use flockform::scene::swarm::Swarm;
-use flockform::swarm::flight::{Flight, fly};
+use flockform::swarm::flight::{Flight, FlightReport, fly};
 use flockform::swarm::plan::SwarmPlan;
 
 use super::support::*;
@@ -241,6 +241,53 @@ fn a_flight_that_ends_before_its_programs_neither_settles_nor_has_a_final_error(
             assert_eq!((verdict.holds, verdict.found.is_some()), (is_measured, is_measured), "{verdict:?}");
         }
     }
+}
+
+/// The end of programs that begin late, that a command ends, and of the program of a scene.
+#[test]
+fn a_formation_settles_from_when_the_programs_really_end() {
+    let report = |text: &str, overrides: &[&str]| {
+        let overrides: Vec<String> = overrides.iter().map(|&one| one.to_owned()).collect();
+        flown(&Swarm::parse("late", "late.toml", text, &overrides, None).expect("a swarm")).1
+    };
+    let text = "title = \"late\"\nradius = 0.2\nlinks = { kind = \"nearest\", count = 2 }\nlimits = { speed = 2.0 }\n\
+                robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [2.0, 0.0] }, \
+                { name = \"c\", place = [4.0, 0.0] }, { name = \"x\", place = [9.0, 9.0] }]\n\
+                leaders = [{ robots = [\"a\", \"c\"], program = { kind = \"manoeuvre\", name = \"m\" } }]\n\
+                manoeuvres = [{ name = \"m\", legs = [{ seconds = 4.0, translate = [5.0, 0.0] }] }]\n\
+                poses = { age_limit = 3.0, stop_after = 4.0 }\n[flight]\nduration = 30.0\nmodel = { kind = \"integrator\" }";
+    let late = report(text, &["flight.faults=[{ robot = \"x\", at = 0.0, what = { kind = \"silent\" } }]"]);
+    let heard = report(text, &[]);
+    assert_eq!(late.programs_end.map(|end| end - heard.programs_end.expect("ends")), Some(5.0));
+    // Everything else happens five seconds later.
+    let settling = |report: &FlightReport| report.settling_time.expect("settles");
+    assert!((settling(&late) - settling(&heard)).abs() < 1e-9, "{} {}", settling(&late), settling(&heard));
+
+    let sent =
+        "flight.commands=[{ after = 200, what = { kind = \"lead\", robot = \"a\", to = [7.0, 1.0] } }]";
+    let sent = report(text, &[sent]);
+    assert!((sent.programs_end.expect("ends") - 10.0).abs() < 1e-9 && settling(&sent) < 10.0, "{sent:?}");
+
+    // The leaders of the scene pull until step 20, and follow from step 21 on.
+    let scene = "title = \"bridge\"\nradius = 0.2\n[scene]\nname = \"tension\"\n[control]\nperiod = 0.1\n[flight]\nduration = ";
+    let bounds = ["flight.bounds={ final_error = 50.0, settling_time = 30.0, settled_within = 50.0 }"];
+    let pulling = report(&format!("{scene}1.0"), &bounds);
+    assert!(!pulling.programs_ended && pulling.bounds.iter().all(|bound| !bound.holds), "{pulling:?}");
+    let whole = report(&format!("{scene}4.0"), &bounds);
+    assert!((whole.programs_end.expect("ends") - 2.1).abs() < 1e-9 && whole.holds(), "{whole:?}");
+
+    // Leaders alone are where they are led to; behind a median no place is known.
+    let alone = text.replace("\"a\", \"c\"]", "\"a\", \"b\", \"c\", \"x\"]");
+    let alone = report(
+        &alone,
+        &["leaders[0].program={ kind = \"path\", points = [{ at = 1.0, displacement = [1.0, 0.0] }] }"],
+    );
+    assert_eq!(alone.formation_error.and_then(|(_, end)| end), Some(0.0), "{alone:?}");
+    let path = "leaders[0].program={ kind = \"path\", points = [{ at = 1.0, displacement = [1.0, 0.0] }] }";
+    let median = report(text, &[path, "rule.mean.kind=\"median\""]);
+    let facts = median.facts(|number| number.to_string());
+    let settled = facts.iter().find(|(name, _)| *name == "Settling time").expect("there");
+    assert!(median.formation_error.is_none() && settled.1.starts_with("not measured"), "{settled:?}");
 }
 
 #[test]

@@ -9,7 +9,7 @@ pub mod state;
 
 use serde::{Deserialize, Serialize};
 
-use super::formation::{Among, Formation, LeadSnapshot, Measures, Seen};
+use super::formation::{Formation, LeadSnapshot, Measures, Seen};
 use super::robots::{DoubleIntegrator, Robot};
 use super::safety::{self, Filter, Flags, Limits, SafetyError, Stray};
 use super::transport::Received;
@@ -303,7 +303,8 @@ impl Control {
 
     /// As [`Control::place_leader`], for any leader, whose own program ends with this.
     pub(crate) fn take_over(&mut self, member: usize, place: [f64; 2]) -> bool {
-        self.is_believed(place) && self.formation.take_over(member, place)
+        let now = self.program_time();
+        self.is_believed(place) && self.formation.take_over(member, place, now)
     }
 
     /// Whether a pose at a place \[m\] would be believed.
@@ -547,12 +548,10 @@ impl Control {
         let seen = Seen { present: &self.present, known: &self.known };
         let mut among = Vec::new();
         for member in (0..self.formation.count()).filter(|&m| self.usable[m] && !self.formation.leads(m)) {
-            let lost = self.formation.neighbours(member).any(|k| !self.usable[k]);
-            if lost || self.max_faulty > 0 {
-                let heard = self.formation.neighbours(member).filter(|&k| self.usable[k]).collect();
-                among.push(Among { member, heard, liars: self.max_faulty, is_trimmed: false });
+            if let Some(one) = self.formation.among(member, &self.usable, self.max_faulty) {
+                self.flags[member] |= if one.is_one_lost { Flags::NEIGHBOUR_LOST } else { 0 };
+                among.push(one);
             }
-            self.flags[member] |= if lost { Flags::NEIGHBOUR_LOST } else { 0 };
         }
         self.formation.advance(&seen, &mut among, time, self.sweeps, &mut self.wanted);
         for one in among.iter().filter(|one| one.is_trimmed) {

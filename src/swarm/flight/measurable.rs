@@ -17,19 +17,24 @@ pub fn require(swarm: &Swarm, flight: &Flight) -> Result<(), SceneError> {
     let has_solids = formation.count() > 1 || !swarm.raw.obstacles.is_empty();
     let no_affine = "the leaders' motion is not affine, so no robot has a place by it";
     let unled = formation.unled();
-    let no_shape = match formation.named(|m| unled.contains(&m)) {
-        Some(names) => &format!("no leader reaches {names}"),
-        None => "the leaders' motion is not affine, and no place of rest behind them can be computed",
+    let led = "let a leader reach every robot by links that last, or leave the bound out";
+    let (no_shape, shaped) = match (formation.named(|m| unled.contains(&m)), formation.no_rest()) {
+        (Some(names), _) => (format!("no leader reaches {names}"), led),
+        (None, why) => {
+            let why = why.map_or(String::new(), |why| format!(": {why}"));
+            let why =
+                format!("the leaders' motion is not affine, and no place of rest behind them is known{why}");
+            (why, "let all leaders follow one manoeuvre, or leave the bound out")
+        }
     };
     let no_continuum = "the robots are not the particles of a scene that runs beside them";
     let no_solids = "there is one robot, and no obstacle";
     let one_manoeuvre = "let all leaders follow one manoeuvre, or bound final_error instead";
-    let led = "let a leader reach every robot by links that last, or leave the bound out";
     let scene = "give [scene] the name of a stepped scene and no [[robots]], or leave the bound out";
     let checks = [
         ("affine_error", bounds.affine_error.is_some(), has_affine, no_affine, one_manoeuvre),
-        ("final_error", bounds.final_error.is_some(), has_shape, no_shape, led),
-        ("settling_time", bounds.settling_time.is_some(), has_shape, no_shape, led),
+        ("final_error", bounds.final_error.is_some(), has_shape, &no_shape, shaped),
+        ("settling_time", bounds.settling_time.is_some(), has_shape, &no_shape, shaped),
         (
             "continuum_error",
             bounds.continuum_error.is_some(),

@@ -51,6 +51,8 @@ pub struct Record {
     pub(super) accelerations: Option<Accelerations>,
     /// Members that led at the start.
     pub(super) leaders: usize,
+    /// If they are over, when the leaders' programs ended: by their own time and by that of the flight \[s\].
+    pub(super) programs_ended: Option<[f64; 2]>,
     every: usize,
     around: Vec<f64>,
 }
@@ -70,6 +72,7 @@ impl Record {
             farthest: Vec::new(),
             accelerations: swarm.raw.limits.acceleration.map(|limit| Accelerations::new(limit, flight)),
             leaders: (0..count).filter(|&m| formation.leads(m)).count(),
+            programs_ended: None,
             every: swarm.raw.flight.record_every,
             around: Vec::new(),
         }
@@ -92,6 +95,7 @@ impl Record {
             *least = least.min(now);
         }
         let time = flight.fleet().time();
+        self.programs_ended = programs_ended(flight, self.programs_ended);
         let clearance = self.around.iter().copied().fold(f64::INFINITY, f64::min);
         if clearance < self.closest.map_or(f64::INFINITY, |closest| closest.value) {
             self.closest = Some(closest(&self.around, clearance, &present, time));
@@ -130,6 +134,18 @@ impl Record {
         }
         sample
     }
+}
+
+/// When the leaders' programs ended, if they are over; `before` is what was known of it a period before.
+fn programs_ended(flight: &Flight, before: Option<[f64; 2]>) -> Option<[f64; 2]> {
+    let (control, time) = (flight.control(), flight.fleet().time());
+    let (formation, now) = (control.formation(), control.program_time());
+    // The last period may end short of them by rounding.
+    let is_over = control.has_begun() && formation.programs_are_over(now + 0.5 * control.period());
+    let end = formation.programs_end();
+    // A scene has steps, not times.
+    let by_flight = if formation.is_led_here() { time - now + end } else { time };
+    is_over.then(|| before.filter(|&[ended, _]| ended == end).unwrap_or([end, by_flight]))
 }
 
 /// The robot farthest from its place, among those that count.

@@ -31,7 +31,8 @@ pub struct FlightReport {
     pub affine_error: Option<(f64, Option<f64>)>,
     /// The same from where the rule comes to rest; absent where it has no single place of rest.
     pub formation_error: Option<(f64, Option<f64>)>,
-    /// When the leaders' programs end; absent where they never do.
+    /// When the leaders' programs ended or, of a flight that was shorter, would have; absent where they never do, and where a scene
+    /// leads that was not over.
     pub programs_end: Option<f64>,
     /// Whether the flight lasted until then. Before, there is neither a settling time nor an end to be at.
     pub programs_ended: bool,
@@ -126,17 +127,21 @@ impl FlightReport {
         let within = number(self.settled_within);
         let settled = match (self.settling_time, self.programs_end) {
             (Some(time), _) => format!("{} s to within {within} m", number(time)),
+            (None, _) if self.affine_error.is_none() && self.formation_error.is_none() => {
+                "not measured: the robots have no place by the leaders' motion, and none of rest is known"
+                    .to_owned()
+            }
             (None, _) if self.programs_ended => format!("never within {within} m"),
             (None, _) if !self.programs_began => {
                 "not measured: the leaders' programs never began, as not all leaders were heard".to_owned()
             }
             (None, Some(end)) => {
                 format!(
-                    "not measured: the flight ends before the leaders' programs, which take {} s",
+                    "not measured: the flight ends before the leaders' programs, which end at {} s",
                     number(end)
                 )
             }
-            (None, None) => "not measured: the leaders' programs never end".to_owned(),
+            (None, None) => "not measured: the leaders' programs go on to the end of the flight".to_owned(),
         };
         let clearance = self.clearance.map(|clearance| {
             let closest = self.closest.as_ref().map_or(String::new(), |moment| format!(": {moment}"));
@@ -164,13 +169,14 @@ impl FlightReport {
         let samples = &record.samples;
         let leaders = (0..formation.count()).filter(|&m| formation.leads(m)).count();
         let bounds = &swarm.raw.flight.bounds;
-        let programs_end = formation.programs_end();
-        // The last period may end short of them by rounding.
-        let programs_ended = flight.control().has_begun()
-            && flight.control().program_time() >= programs_end - 0.5 * flight.control().period();
+        let programs_ended = record.programs_ended.map(|[_, by_flight]| by_flight);
+        let waited = match flight.control().has_begun() {
+            true => flight.fleet().time() - flight.control().program_time(),
+            false => 0.0,
+        };
+        let to_come = finite(waited + formation.programs_end()).filter(|_| formation.is_led_here());
         let never_heard = (0..formation.count()).filter(|&m| flight.control().position(m).is_none());
         let never_heard: Vec<String> = never_heard.map(|m| formation.names[m].clone()).collect();
-        let settling_time = settling_time(samples, programs_end, bounds.settled_within);
         let mut report = Self {
             name: swarm.name.clone(),
             title: swarm.raw.title.clone(),
@@ -182,10 +188,10 @@ impl FlightReport {
             periods: flight.fleet().period(),
             affine_error: largest_and_end(samples, |s| s.affine_error),
             formation_error: largest_and_end(samples, |s| s.formation_error),
-            programs_end: finite(programs_end),
-            programs_ended,
+            programs_end: programs_ended.or(to_come),
+            programs_ended: programs_ended.is_some(),
             programs_began: flight.control().has_begun(),
-            settling_time: settling_time.filter(|_| programs_ended),
+            settling_time: programs_ended.and_then(|end| settling_time(samples, end, bounds.settled_within)),
             settled_within: bounds.settled_within,
             closest: record.closest.map(|closest| closest.named(&formation.names)),
             clearance: finite(samples.iter().map(|s| s.clearance).fold(f64::INFINITY, f64::min)),

@@ -1,6 +1,6 @@
 //! Builds a formation from a swarm file, with the checks that need the places.
 
-use super::{Formation, Lead, TargetSource, checks, inside, links, spacing_of};
+use super::{Formation, Lead, NoRest, TargetSource, checks, inside, links, spacing_of};
 use crate::continuum::layout::Layout;
 use crate::continuum::plan::Plan;
 use crate::engine::Engine;
@@ -184,12 +184,13 @@ fn formation(
         entries: vec![None; names.len()],
         spacing: spacing_of(&places),
         manoeuvres: swarm.manoeuvres.clone(),
-        settling: None,
+        settling: Err(NoRest::NoRule),
         settled_roles: Vec::new(),
         names,
         places,
         course,
         is_scene,
+        taken_over: 0.0,
     };
     formation.look_at_roles();
     formation

@@ -28,6 +28,7 @@ use crate::swarm::resilience::{Trim, supported, trim};
 use crate::sweep::Order;
 pub(in crate::swarm) use checks::first_few;
 pub use kept::LeadSnapshot;
+pub(in crate::swarm) use settling::NoRest;
 use settling::Settling;
 
 /// Members are named by their number, from 0; positions in \[m\], world frame.
@@ -46,12 +47,14 @@ pub struct Formation {
     entries: Vec<Option<usize>>,
     course: TargetSource,
     spacing: f64,
-    /// Shared by copies: it is large, and never changed.
-    settling: Option<Arc<Settling>>,
+    /// Shared by copies: it is large, and never changed; or why there is none.
+    settling: Result<Arc<Settling>, NoRest>,
     /// Roles for which `settling` was computed.
     settled_roles: Vec<Role>,
     /// Whether a scene's own program leads.
     is_scene: bool,
+    /// When a leader was last sent to a place in place of its program \[s\].
+    taken_over: f64,
 }
 
 /// The source of targets.
@@ -134,6 +137,39 @@ impl Formation {
         matches!(&self.course, TargetSource::Rule { engine, .. } if engine.update().order == Order::Synchronous)
     }
 
+    /// What a follower goes by where it leaves some of its neighbours out; `None` if it goes by all that it looks at.
+    pub(in crate::swarm) fn among(&self, member: usize, is_heard: &[bool], liars: usize) -> Option<Among> {
+        let TargetSource::Rule { engine, particles } = &self.course else { return None };
+        let frame = engine.body().frame.as_ref();
+        let member_of = |particle: u32| particles.binary_search(&(particle as usize)).ok();
+        let mut among = Among {
+            member,
+            is_one_lost: false,
+            is_trimmed: false,
+            heard: Vec::new(),
+            points: Vec::new(),
+            liars,
+        };
+        for &k in engine.flock().neighbours.of(particles[member]) {
+            let point = frame.and_then(|frame| Some((frame, frame.points.binary_search(&k).ok()?)));
+            let is_known = match point {
+                Some((frame, number)) => frame
+                    .served_by(number)
+                    .iter()
+                    .filter_map(|&served| member_of(served))
+                    .all(|m| is_heard[m]),
+                None => member_of(k).is_none_or(|m| is_heard[m]),
+            };
+            among.is_one_lost |= !is_known;
+            match member_of(k).filter(|_| is_known) {
+                Some(neighbour) => among.heard.push(neighbour),
+                None if is_known && liars == 0 => among.points.push(k),
+                None => {}
+            }
+        }
+        (among.is_one_lost || liars > 0).then_some(among)
+    }
+
     /// Members whose positions the member's target depends on.
     pub fn depends_on(&self, member: usize) -> Vec<usize> {
         let TargetSource::Rule { engine, particles } = &self.course else { return Vec::new() };
@@ -184,12 +220,13 @@ impl Formation {
         }
     }
 
-    /// Sends a leader to a place \[m\], from now on moved from outside; false for a member that no program of the swarm
+    /// Sends a leader to a place \[m\] from `now` \[s\] on, moved from outside; false for a member that no program of the swarm
     /// leads.
-    pub(crate) fn take_over(&mut self, member: usize, place: [f64; 2]) -> bool {
+    pub(crate) fn take_over(&mut self, member: usize, place: [f64; 2], now: f64) -> bool {
         let is_led = self.leads[member].is_some();
         if is_led {
             self.leads[member] = Some(Lead::External(place));
+            self.taken_over = now;
         }
         is_led
     }
@@ -252,7 +289,8 @@ impl Formation {
         leads.all(|lead| of(lead) == Some(first)).then_some(first)
     }
 
-    /// The end of the last program of the swarm's leaders \[s\].
+    /// The end of the last program of the swarm's leaders, or when one of them was last sent to a place instead \[s\]. Of a scene's
+    /// own program [`Formation::programs_are_over`] alone knows.
     pub fn programs_end(&self) -> f64 {
         let end = |lead: &Lead| match lead {
             Lead::External(_) => 0.0,
@@ -262,7 +300,18 @@ impl Formation {
             Lead::Motion { .. } => f64::INFINITY,
             Lead::Manoeuvre { manoeuvre, since } => since + manoeuvre.duration(),
         };
-        self.leads.iter().flatten().map(end).fold(0.0, f64::max)
+        self.leads.iter().flatten().map(end).fold(self.taken_over, f64::max)
+    }
+
+    /// Whether all programs that lead the formation have ended by `now` \[s\].
+    pub(in crate::swarm) fn programs_are_over(&self, now: f64) -> bool {
+        let is_scene_over = match &self.course {
+            TargetSource::Recorded { steps, step } => step + 1 >= steps.len(),
+            TargetSource::Rule { engine, .. } | TargetSource::Inside { engine, .. } => {
+                self.is_led_here() || !engine.is_scheduled()
+            }
+        };
+        is_scene_over && now >= self.programs_end()
     }
 
     /// The place of a leader at `time` by its program \[m\].
@@ -386,11 +435,16 @@ impl Formation {
             .then(|| self.places.iter().map(|[x, y]| [x + first[0], y + first[1]]).collect())
     }
 
-    /// Each member's place of rest with the leaders at their places in `present` \[m\]; `None` where the rule is not
-    /// linear.
+    /// Why no place of rest behind the leaders is known.
+    pub(in crate::swarm) fn no_rest(&self) -> Option<&NoRest> {
+        self.settling.as_ref().err()
+    }
+
+    /// Each member's place of rest with the leaders at their places in `present` \[m\]; `None` where it is not
+    /// [known](NoRest).
     pub fn settled(&self, present: &Vectors) -> Option<Vectors> {
         let TargetSource::Rule { particles, .. } = &self.course else { return None };
-        let settling = self.settling.as_ref()?;
+        let settling = self.settling.as_ref().ok()?;
         let of_particle = |i: usize| {
             let m = particles.binary_search(&i).ok()?;
             let (now, then) = (present.get(m), self.places.get(m));
@@ -451,12 +505,17 @@ impl Formation {
 pub struct Among {
     /// Its number.
     pub member: usize,
-    /// The neighbours that are heard.
-    pub heard: Vec<usize>,
-    /// Of those, the liars tolerated: it leaves out as many of the neighbours that stray farthest from it.
-    pub liars: usize,
+    /// Whether any of those that it looks at is lost.
+    pub is_one_lost: bool,
     /// Whether it left out any by where they are seen.
     pub is_trimmed: bool,
+    /// The neighbours that are heard.
+    heard: Vec<usize>,
+    /// The points of the frame that it looks at, of those that are heard alone. A liar would have a vote more with each point that
+    /// copies it: where liars are tolerated there are none.
+    points: Vec<u32>,
+    /// Of the neighbours heard, the liars tolerated: it leaves out as many of those that stray farthest from it.
+    liars: usize,
 }
 
 impl Among {
@@ -478,7 +537,7 @@ impl Among {
         let target = [0, 1].map(|axis| {
             let counts = |i: usize| match particles.binary_search(&i) {
                 Ok(m) => self.heard.iter().zip(&keep).any(|(&heard, keep)| heard == m && keep[axis]),
-                Err(_) => true,
+                Err(_) => self.points.contains(&(i as u32)),
             };
             let target = flock.target_among(particle, before, counts);
             target.map_or(here[axis], |to| here[axis] + engine.update().damping * (to[axis] - here[axis]))

@@ -27,28 +27,50 @@ pub struct Settling {
     offset: DMatrix<f64>,
 }
 
+/// Why no place of rest behind the leaders is known.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub(in crate::swarm) enum NoRest {
+    /// A scene's body or a recording sends the robots.
+    #[error("the robots are not sent by a rule over their neighbours")]
+    NoRule,
+    /// There is no such product.
+    #[error("their rule is not linear")]
+    NotLinear,
+    /// It would take long.
+    #[error("it is computed for {MOST_FOLLOWERS} followers at most, and there are {0}")]
+    TooMany(usize),
+    /// Some follow no leader.
+    #[error("the leaders do not decide it alone")]
+    Undecided,
+}
+
 impl Settling {
-    /// `None` where the rule is not linear, has no single place of rest, or the followers are too many.
-    pub fn of(engine: &Engine) -> Option<Self> {
+    /// Of the roles that the members have.
+    ///
+    /// # Errors
+    /// Says why there is none.
+    pub fn of(engine: &Engine) -> Result<Self, NoRest> {
         let roles = engine.roles();
         let follows: Vec<bool> = roles.iter().map(|&role| role == Role::Follower).collect();
         let leads = |&i: &usize| roles[i].is_led();
         let leaders: Vec<usize> = (0..roles.len()).filter(leads).collect();
         let followers: Vec<usize> = (0..roles.len()).filter(|&i| follows[i]).collect();
-        if followers.is_empty() || followers.len() > MOST_FOLLOWERS {
-            return None;
+        if followers.len() > MOST_FOLLOWERS {
+            return Err(NoRest::TooMany(followers.len()));
         }
         let held = Vectors::zeros(roles.len());
-        let system = system(engine.flock(), engine.body(), follows.clone(), held, &[]).ok()?;
+        let system = system(engine.flock(), engine.body(), follows.clone(), held, &[]);
+        let system = system.map_err(|_| NoRest::NotLinear)?;
         let mut number = vec![None; roles.len()];
         followers.iter().enumerate().for_each(|(n, &i)| number[i] = Some(n));
         leaders.iter().enumerate().for_each(|(n, &i)| number[i] = Some(n));
         let (k_ff, k_fl, forces) = dense(engine, &system, &followers, leaders.len(), &number, &follows);
-        let factors = k_ff.lu();
-        let answer = factors.solve(&k_fl)?;
-        let offset = factors.solve(&forces)?;
+        let factors = (!followers.is_empty()).then(|| k_ff.lu());
+        let solved =
+            |right: DMatrix<f64>| factors.as_ref().map_or(Some(right.clone()), |lu| lu.solve(&right));
+        let (answer, offset) = solved(k_fl).zip(solved(forces)).ok_or(NoRest::Undecided)?;
         let is_finite = answer.iter().chain(offset.iter()).all(|value| value.is_finite());
-        is_finite.then_some(Self { number, follows, leaders, answer, offset })
+        if is_finite { Ok(Self { number, follows, leaders, answer, offset }) } else { Err(NoRest::Undecided) }
     }
 
     /// Displacement of each follower \[m\] when leaders have those that `of_particle` gives; `None` for others.

@@ -13,7 +13,7 @@ use crate::scene::swarm::raw::{RawCommandKind, RawSwarm};
 use crate::scene::swarm::{Program, Swarm};
 use crate::scene::text::{decimals, number};
 use crate::swarm::flight::Flight;
-use crate::swarm::formation::Formation;
+use crate::swarm::formation::{Formation, first_few};
 use crate::swarm::safety::foot;
 pub use network::{late_without_speed, of_real_robots};
 
@@ -29,6 +29,7 @@ pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
     let raw = &swarm.raw;
     let one = [
         late_faults(flight, raw),
+        short_faults(raw),
         hidden_fault(raw),
         late_commands(flight, raw),
         unled(formation),
@@ -60,6 +61,22 @@ fn late_faults(flight: &Flight, raw: &RawSwarm) -> Option<String> {
     let late = raw.flight.faults.iter().enumerate().filter(|(_, fault)| fault.at > end);
     let keys = late.map(|(k, fault)| format!("flight.faults[{k}].at = {}", fault.at));
     beyond(&format!("the end of the flight, at {end} s"), keys, "flight.duration")
+}
+
+/// Faults that end before a period begins in them: robots are looked at as periods begin.
+fn short_faults(raw: &RawSwarm) -> Option<String> {
+    let period = raw.control.period;
+    let is_between = |at: f64, until: f64| {
+        let first = (at / period).floor();
+        !(0..=2).any(|k| (at..until).contains(&((first + f64::from(k)) * period)))
+    };
+    let short = raw.flight.faults.iter().enumerate();
+    let short = short.filter(|(_, fault)| fault.until.is_some_and(|until| is_between(fault.at, until)));
+    let keys: Vec<String> = short.map(|(k, _)| format!("flight.faults[{k}]")).collect();
+    let names = first_few(keys.into_iter())?;
+    Some(format!(
+        "no period begins while these faults last, which are without effect: {names}; let them last a control.period"
+    ))
 }
 
 /// A fault that another of the same robot hides.
