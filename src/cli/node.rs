@@ -83,22 +83,35 @@ fn ended(well: bool) -> ExitCode {
 
 /// In the process that does the work its life, which shared memory needs none of; in the one that outlives it the
 /// code to end with.
-fn life(transport: Transport, ros: &RosArguments) -> Result<Result<Option<Life>, ExitCode>, Refusal> {
+fn life(
+    transport: Transport,
+    swarm: &SwarmFileArguments,
+    ros: &RosArguments,
+) -> Result<Result<Option<Life>, ExitCode>, Refusal> {
     match transport {
         Transport::Shm => Ok(Ok(None)),
-        Transport::Ros2 => Ok(supervise(&ros.security).map_err(Refusal::Supervise)?.map(Some)),
+        Transport::Ros2 => {
+            let life = supervise(&ros.security, || swarm.read()).map_err(Refusal::Supervise)?;
+            Ok(life.map(Some))
+        }
     }
+}
+
+/// The swarm as its file was when the flight began.
+fn as_begun(swarm: &SwarmFileArguments, life: &mut Option<Life>) -> SwarmFileArguments {
+    swarm.as_read(life.as_mut().and_then(Life::text))
 }
 
 /// Keeps a formation until it is interrupted.
 pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, Refusal> {
-    let life = match life(arguments.transport, ros)? {
+    let mut life = match life(arguments.transport, &arguments.swarm, ros)? {
         Ok(life) => life,
         Err(code) => return Ok(code),
     };
     // A node has a leave to take, and files of shared memory to remove: an interrupt waits until it is open.
     let interrupted = interrupt::serves();
-    let swarm = arguments.swarm.load()?;
+    let file = as_begun(&arguments.swarm, &mut life);
+    let swarm = file.load()?;
     let name = arguments.member.as_deref();
     match life {
         Some(mut life) => {
@@ -111,7 +124,7 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
                 .transpose()?;
             let mut node = FormationNode::open(&swarm, ros, name).map_err(|error| refused(&swarm, error))?;
             let (member, namespace) = (arguments.member.clone(), Some(node.fleet().to_owned()));
-            let mut about = About { member, namespace, ..arguments.swarm.about("node", &swarm) };
+            let mut about = About { member, namespace, ..file.about("node", &swarm) };
             about.set.extend(node.overrides(&swarm));
             about.taken_over = left.as_ref().map(|left| left.node.control().clone());
             let recording = arguments.record.open(&about, false, life.number())?;
@@ -283,12 +296,12 @@ fn announce(swarm: &Swarm, control: &Control) {
 
 /// Flies simulated robots until they are interrupted.
 pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCode, Refusal> {
-    let life = match life(arguments.transport, ros)? {
+    let mut life = match life(arguments.transport, &arguments.swarm, ros)? {
         Ok(life) => life,
         Err(code) => return Ok(code),
     };
     let interrupted = interrupt::serves();
-    let swarm = arguments.swarm.load()?;
+    let swarm = as_begun(&arguments.swarm, &mut life).load()?;
     let announce = |count| tracing::info!("`{}`: {count} simulated robots", swarm.name);
     match life {
         Some(mut life) => {

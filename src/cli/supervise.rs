@@ -4,7 +4,8 @@
 //! survives exhausted memory. So `node` and `robots` are two processes. This one holds no socket and hardly any memory;
 //! its child does the work and sends its state ten times a second, over the socket that is the child's standard input.
 //! A child that ends without having been asked to, or falls silent, is followed by another at once, which gets that
-//! state first. The alternative, a middleware in a process of its own under a loop that goes on, would be back no
+//! state first, and before it the text of the swarm's file as it was at the start: what someone writes there meanwhile is for the
+//! next flight. The alternative, a middleware in a process of its own under a loop that goes on, would be back no
 //! sooner, because finding the peers again takes the time, and a loop without a middleware receives no poses.
 
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
@@ -36,9 +37,11 @@ const LEAVING: Duration = Duration::from_secs(8);
 const UNOPENED: Duration = Duration::from_millis(700);
 /// How long a child that is not stopped may take until it speaks \[s\].
 const OPENING: Duration = Duration::from_secs(30);
-/// Children in a row that end without a word before we give up \[1\]: for a reason of their own, and as those do whose
-/// middleware strangers flood, one after the other while that lasts.
+/// Children in a row that end without a word before we give up \[1\]: for a reason of their own; because they are refused what was
+/// taken before, which may pass in half a minute; and as those do whose middleware strangers flood, one after the other while that
+/// lasts.
 const SPEECHLESS: u32 = 5;
+const REFUSED: u32 = 30;
 const ENDED: u32 = 300;
 /// Longest wait before the next child, after several short lives \[s\].
 const REST: Duration = Duration::from_secs(1);
@@ -47,27 +50,33 @@ const REST: Duration = Duration::from_secs(1);
 pub struct Life {
     number: u32,
     socket: Option<UnixStream>,
+    /// What was sent before it began: the text of the file, and the state.
+    begun_with: Option<BufReader<UnixStream>>,
     /// The part of the last state that has not been sent yet.
     unsent: Vec<u8>,
     sent: Option<Instant>,
 }
 
 /// Runs this program again as a child, and another whenever one ends for no reason of its own; returns in the child,
-/// and in this process with the code of the last.
-pub fn supervise(security: &Security) -> std::io::Result<Result<Life, ExitCode>> {
+/// and in this process with the code of the last. All of them work by the `text` that is read here, if there is any.
+pub fn supervise(
+    security: &Security,
+    text: impl FnOnce() -> Option<String>,
+) -> std::io::Result<Result<Life, ExitCode>> {
     match std::env::var(LIFE).ok().and_then(|number| number.parse().ok()) {
         Some(number) => Ok(Ok(Life::take_up(number)?)),
-        None => lead(longest_silence(security) + BEYOND_ITS_WATCHDOG).map(Err),
+        None => lead(longest_silence(security) + BEYOND_ITS_WATCHDOG, text).map(Err),
     }
 }
 
-fn lead(silence: Duration) -> std::io::Result<ExitCode> {
+fn lead(silence: Duration, text: impl FnOnce() -> Option<String>) -> std::io::Result<ExitCode> {
     let stop = interrupt::serves();
+    let text = [serde_json::to_vec(&text())?, b"\n".to_vec()].concat();
     let (mut state, mut speechless, mut rest) = (b"null\n".to_vec(), 0, Duration::ZERO);
     let (mut has_run, mut given_up_with) = (false, MIDDLEWARE_GONE);
     for number in 1_u32.. {
         let begun = Instant::now();
-        let (mut child, lines) = start(number, &state)?;
+        let (mut child, lines) = start(number, [&text[..], &state[..]].concat())?;
         let (code, last) = follow(&mut child, lines, silence, stop)?;
         speechless = if last.is_some() { 0 } else { speechless + 1 };
         has_run |= last.is_some();
@@ -77,7 +86,11 @@ fn lead(silence: Duration) -> std::io::Result<ExitCode> {
             Some(code @ 0..=2) if code != BAD_INPUT || !has_run => return Ok(ExitCode::from(code)),
             _ if stop.load(Ordering::Relaxed) => return Ok(ExitCode::SUCCESS),
             _ if speechless
-                >= if matches!(code, None | Some(MIDDLEWARE_GONE)) { ENDED } else { SPEECHLESS } =>
+                >= match code {
+                    None | Some(MIDDLEWARE_GONE) => ENDED,
+                    Some(BAD_INPUT) => REFUSED,
+                    _ => SPEECHLESS,
+                } =>
             {
                 given_up_with = code.filter(|&code| code == BAD_INPUT).unwrap_or(MIDDLEWARE_GONE);
                 break;
@@ -97,12 +110,12 @@ fn lead(silence: Duration) -> std::io::Result<ExitCode> {
         };
         std::thread::sleep(rest);
     }
-    tracing::error!("one process after the other ended before it had begun");
+    tracing::error!("{speechless} processes in a row ended before they had begun");
     Ok(ExitCode::from(given_up_with))
 }
 
-/// Starts a child and sends it the state.
-fn start(number: u32, state: &[u8]) -> std::io::Result<(Child, Lines)> {
+/// Starts a child and sends it what it begins with.
+fn start(number: u32, begins_with: Vec<u8>) -> std::io::Result<(Child, Lines)> {
     let (ours, theirs) = UnixStream::pair()?;
     let child = Command::new(program()?)
         .args(std::env::args_os().skip(1))
@@ -110,10 +123,10 @@ fn start(number: u32, state: &[u8]) -> std::io::Result<(Child, Lines)> {
         .stdin(Stdio::from(OwnedFd::from(theirs)))
         .spawn()?;
     let (say, lines) = channel();
-    let (reader, mut writer, state) = (BufReader::new(ours.try_clone()?), ours.try_clone()?, state.to_vec());
+    let (reader, mut writer) = (BufReader::new(ours.try_clone()?), ours.try_clone()?);
     std::thread::spawn(move || {
         // A child that is gone is noticed by its end.
-        let _ = writer.write_all(&state);
+        let _ = writer.write_all(&begins_with);
         for line in reader.split(b'\n').map_while(Result::ok) {
             if say.send(line).is_err() {
                 return;
@@ -186,7 +199,8 @@ impl Life {
     fn take_up(number: u32) -> std::io::Result<Self> {
         use std::os::fd::AsFd;
         let socket = UnixStream::from(std::io::stdin().as_fd().try_clone_to_owned()?);
-        Ok(Self { number, socket: Some(socket), unsent: Vec::new(), sent: None })
+        let begun_with = Some(BufReader::new(socket.try_clone()?));
+        Ok(Self { number, socket: Some(socket), begun_with, unsent: Vec::new(), sent: None })
     }
 
     /// From 1.
@@ -194,14 +208,20 @@ impl Life {
         self.number
     }
 
+    /// The text of the file when the first process began, to be asked for first.
+    pub fn text(&mut self) -> Option<String> {
+        self.line().unwrap_or_else(|error| {
+            tracing::warn!("what the file held cannot be read ({error}): it is read again");
+            None
+        })
+    }
+
     /// The last state that the previous process sent.
     pub fn left<T: DeserializeOwned>(&mut self) -> Option<T> {
+        let left = self.line();
+        self.begun_with = None;
         let socket = self.socket.as_ref()?;
-        let mut line = Vec::new();
-        let patience = socket.set_read_timeout(Some(Duration::from_secs(2)));
-        let read = patience.and_then(|()| BufReader::new(socket).read_until(b'\n', &mut line));
-        let read = socket.set_nonblocking(true).and(read);
-        match read.map_err(|error| error.to_string()).and_then(|_| parse(&line)) {
+        match socket.set_nonblocking(true).map_err(|error| error.to_string()).and(left) {
             Ok(left) => left,
             Err(error) => {
                 tracing::warn!(
@@ -210,6 +230,14 @@ impl Life {
                 None
             }
         }
+    }
+
+    fn line<T: DeserializeOwned>(&mut self) -> Result<Option<T>, String> {
+        let Some(begun_with) = &mut self.begun_with else { return Ok(None) };
+        let mut line = Vec::new();
+        let patience = begun_with.get_ref().set_read_timeout(Some(Duration::from_secs(2)));
+        let read = patience.and_then(|()| begun_with.read_until(b'\n', &mut line));
+        read.map_err(|error| error.to_string()).and_then(|_| parse(&line))
     }
 
     /// Sends the state if it is due. Returns false if the socket is closed: the process should end.

@@ -16,7 +16,7 @@ use flockform::record::flight::FlightMessages;
 use flockform::record::{About, Shared};
 use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
-use flockform::scene::text::counted;
+use flockform::scene::text::{self, counted};
 use flockform::swarm::control::Control;
 use flockform::swarm::flight::{Flight, FlightReport, Record, Sample, fly_with_observer};
 use flockform::swarm::plan::cautions;
@@ -35,11 +35,25 @@ pub struct SwarmFileArguments {
     pub swarm: String,
     #[command(flatten)]
     pub overrides: Overrides,
+    /// Text of the file, where it has been read.
+    #[arg(skip)]
+    text: Option<String>,
 }
 
 impl SwarmFileArguments {
     pub fn new(swarm: &str, set: &[String]) -> Self {
-        Self { swarm: swarm.to_owned(), overrides: Overrides { set: set.to_vec() } }
+        Self { swarm: swarm.to_owned(), overrides: Overrides { set: set.to_vec() }, text: None }
+    }
+
+    /// The text of the file; `None` where there is none that can be read, which [`SwarmFileArguments::load`] says.
+    pub fn read(&self) -> Option<String> {
+        let path = bundled_swarm(&self.swarm).is_none().then(|| Kind::Swarm.path(&self.swarm).ok())??;
+        text::read(&path).ok()
+    }
+
+    /// The same of a file that had this text when it was read.
+    pub fn as_read(&self, text: Option<String>) -> Self {
+        Self { text, ..Self::new(&self.swarm, &self.overrides.set) }
     }
 
     pub fn load(&self) -> Result<Swarm, Refusal> {
@@ -47,16 +61,18 @@ impl SwarmFileArguments {
             return Ok(bundled.load_swarm(&self.overrides.set)?);
         }
         let path = Kind::Swarm.path(&self.swarm)?;
-        Swarm::from_file(&path, &self.overrides.set)
-            .map_err(|error| Kind::Swarm.refuse_other(&self.swarm).unwrap_or(error.into()))
+        let loaded = match self.text.clone() {
+            Some(text) => Swarm::from_text_of_file(&path, text, &self.overrides.set),
+            None => Swarm::from_file(&path, &self.overrides.set),
+        };
+        loaded.map_err(|error| Kind::Swarm.refuse_other(&self.swarm).unwrap_or(error.into()))
     }
 
     /// The description of the swarm for a recording.
     pub fn about(&self, source: &'static str, swarm: &Swarm) -> About {
-        let path = Path::new(&self.swarm);
         let bundled = bundled_swarm(&self.swarm);
-        let text =
-            bundled.map_or_else(|| std::fs::read_to_string(path).ok(), |one| Some(one.text.to_owned()));
+        let text = self.text.clone().or_else(|| self.read());
+        let text = bundled.map_or(text, |one| Some(one.text.to_owned()));
         About {
             source,
             name: swarm.name.clone(),

@@ -1,5 +1,7 @@
 //! The middleware dies, goes deaf or eats the memory; the swarm must not.
 
+use std::path::Path;
+use std::process::Command;
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
@@ -374,28 +376,72 @@ fn a_program_whose_file_is_removed_or_replaced_goes_on_when_its_worker_dies() {
     assert_eq!(node.terminate(), Some(0));
 }
 
+/// What is refused: a recorded run that the swarm names, which is away for a moment.
 #[test]
 fn what_is_refused_for_a_moment_after_a_program_has_run_does_not_end_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (file, table) = (folder.path().join("flown.toml"), folder.path().join("probes.csv"));
+    let text = "title = \"flown\"\nradius = 0.01\n[scene]\nname = \"tension\"\nrecording = \"probes.csv\"\n[limits]\nspeed = 100.0\n";
+    std::fs::write(&file, text).expect("written");
+    let run = [
+        "run",
+        "tension",
+        "--set",
+        "record.probes=[67, 68, 115]",
+        "--figures",
+        "none",
+        "--no-report",
+        "--out",
+        "run",
+    ];
+    let run = Command::new(PROGRAM).args(run).current_dir(folder.path()).output().expect("runs");
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    std::fs::copy(folder.path().join("run/probes.csv"), &table).expect("copied");
+    let (mut node, says) = flying(&file, "3 robots at");
+    let worker = until("a worker", || node.worker());
+    let away = folder.path().join("away.csv");
+    std::fs::rename(&table, &away).expect("moved");
+    signal("KILL", worker);
+    says("ended with code 2");
+    std::fs::rename(&away, &table).expect("moved back");
+    says("3 robots at");
+    assert_eq!(node.terminate(), Some(0));
+}
+
+/// What is written there meanwhile is for the next flight: other radii, another order of the robots, half a line, nothing.
+#[test]
+fn the_file_of_a_flight_is_read_when_it_begins_and_never_again() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("pair.toml");
     let text = "title = \"pair\"\nradius = 0.2\nrobots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [2.0, 0.0] }]\n\
         links = { kind = \"nearest\", count = 1 }\nleaders = [{ robots = [\"a\"], program = { kind = \"external\" } }]\n\
         limits = { speed = 1.0 }\n";
     std::fs::write(&file, text).expect("written");
+    let (mut node, says) = flying(&file, "2 robots at");
+    let three = text.replace("robots = [", "robots = [{ name = \"c\", place = [9.0, 0.0] }, ");
+    assert!(three.len() > text.len());
+    for written in [Some(three.as_str()), Some("radius = "), None] {
+        std::fs::remove_file(&file).expect("there");
+        written.iter().for_each(|written| std::fs::write(&file, written).expect("written"));
+        let worker = until("a worker", || node.worker());
+        signal("KILL", worker);
+        says("was ended");
+        says("2 robots at");
+        std::thread::sleep(Duration::from_secs(1));
+        std::fs::write(&file, "").expect("written");
+    }
+    assert_eq!(node.terminate(), Some(0));
+}
+
+/// A node of the file once it says these words, and what waits for others.
+fn flying(file: &Path, words: &str) -> (Running, impl Fn(&str)) {
     let mut node = Running::start(&mut command(domain(), &["node", file.to_str().expect("a path")]));
     let lines = node.lines();
-    let says = |words: &str| until(words, || lines.try_iter().find(|line| line.contains(words)));
-    says("2 robots at");
+    let says = move |words: &str| drop(until(words, || lines.try_iter().find(|line| line.contains(words))));
+    says(words);
     // It has said so to the process that starts others.
     std::thread::sleep(Duration::from_secs(1));
-    let worker = until("a worker", || node.worker());
-    let away = folder.path().join("away.toml");
-    std::fs::rename(&file, &away).expect("moved");
-    signal("KILL", worker);
-    says("ended with code 2");
-    std::fs::rename(&away, &file).expect("moved back");
-    says("2 robots at");
-    assert_eq!(node.terminate(), Some(0));
+    (node, says)
 }
 
 /// Takes seconds from `FLOCKFORM_ATTACK_SECONDS`.

@@ -24,7 +24,16 @@ impl Swarm {
     /// Every key that is unknown, missing, out of range or at odds with another, with its line.
     pub fn from_file(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
         let help = "give the path of a swarm file, or a name that `flockform list swarms` lists";
-        let File { name, file, text } = File::read(path, help)?;
+        let File { text, .. } = File::read(path, help)?;
+        Self::from_text_of_file(path, text, overrides)
+    }
+
+    /// The same of a file whose text has been read.
+    ///
+    /// # Errors
+    /// As [`Swarm::from_file`].
+    pub fn from_text_of_file(path: &Path, text: String, overrides: &[String]) -> Result<Self, SceneError> {
+        let File { name, file, text } = File::of(path, text);
         Self::parse(&name, &file, &text, overrides, path.parent())
     }
 

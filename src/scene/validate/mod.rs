@@ -91,15 +91,20 @@ impl File {
     /// # Errors
     /// Why it cannot be read, with `help`.
     pub(super) fn read(path: &Path, help: &str) -> Result<Self, SceneError> {
-        let file = path.display().to_string();
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         match text::read(path) {
-            Ok(text) => Ok(Self { name, file, text }),
+            Ok(text) => Ok(Self::of(path, text)),
             Err(error) => {
                 let message = format!("cannot be read: {error}");
+                let file = path.display().to_string();
                 Err(Problem::of_file(&file, message, Some(help.to_owned())).into())
             }
         }
+    }
+
+    /// The file at `path`, of which the text is known.
+    pub(super) fn of(path: &Path, text: String) -> Self {
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        Self { name, file: path.display().to_string(), text }
     }
 }
 

@@ -8,7 +8,7 @@ use crate::swarm::formation::first_few;
 /// Time without a pose after which the log says so.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// The robots of which no pose has been believed yet.
+/// The robots of which no pose has been believed yet, or none that is not too old by now.
 #[derive(Clone, Debug, Default)]
 pub struct Silence {
     missing: Vec<usize>,
@@ -34,7 +34,8 @@ impl Silence {
         now: Instant,
     ) -> Option<String> {
         let watch = control.watch();
-        let missing = heard.iter().copied().filter(|&m| watch.place(m).is_none());
+        let is_heard = |m: usize| watch.place(m).is_some() && control.health(m).is_usable();
+        let missing = heard.iter().copied().filter(|&m| !is_heard(m));
         if self.since.is_none() || !missing.clone().eq(self.missing.iter().copied()) {
             *self = Self { missing: missing.collect(), since: Some(now), is_said: false };
         }
@@ -54,6 +55,7 @@ impl Silence {
         let (leaders, followers): (Vec<usize>, Vec<usize>) =
             self.missing.iter().partition(|&&m| control.formation().leads(m));
         let (robots, what) = match (control.has_begun(), leaders.is_empty()) {
+            _ if self.missing == heard => (self.missing.clone(), "no robot is sent a target"),
             (false, false) => (leaders, "the programs of the leaders wait, and no robot moves before"),
             (true, false) => (self.missing.clone(), "the swarm flies without"),
             (_, true) => (followers, "the swarm flies without"),
@@ -109,5 +111,22 @@ mod tests {
         assert!(text.contains("flies without"), "{text}");
         hear(&mut control, follower);
         assert_eq!((at(&control, 76), at(&control, 99)), (None, None));
+        // One is heard on, and at last none.
+        for k in 0..10 {
+            let (position, now) = (control.formation().places.get(follower), 8.0 + 0.1 * f64::from(k));
+            let _ =
+                control.receive(follower, Pose { position, yaw: 0.0, stamp: now, frame_is_right: true }, now);
+        }
+        control.tick(9.0);
+        assert_eq!(at(&control, 100), None);
+        let text = at(&control, 105).expect("a line");
+        assert!(
+            text.contains("and 18 more has been believed for 5 s") && text.contains("flies without"),
+            "{text}"
+        );
+        control.tick(20.0);
+        assert_eq!(at(&control, 106), None);
+        let text = at(&control, 111).expect("a line");
+        assert!(text.contains("no robot is sent a target"), "{text}");
     }
 }
