@@ -62,8 +62,9 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
                 return if *json { Ok(print(&format!("{value:#}\n"))?) } else { Ok(say(&words)?) };
             }
             let plan = plan_of(&scene)?;
-            let mut report = PlanReport::new(&scene, &plan)?;
+            // Before the report, which takes what a run does not.
             let memory = [Outputs::ALL, Outputs::TABLES].map(|outputs| predicted(&scene, &plan, outputs));
+            let mut report = PlanReport::new(&scene, &plan)?;
             let [all, tables] = memory.map(readable_bytes);
             let fallback = fallback(&scene, &plan).map_or_else(String::new, |bytes| {
                 let bytes = readable_bytes(bytes);

@@ -4,6 +4,7 @@ use super::plan::Plan;
 use crate::engine::setup::Setup;
 use crate::engine::several::looks_at_every_step;
 use crate::flock::neighbourhood::Neighbours;
+use crate::flock::role::Role;
 use crate::geometry::lists::lists_of;
 use crate::sweep::Sweep;
 
@@ -11,10 +12,10 @@ use crate::sweep::Sweep;
 /// are known to change nothing and are left out. `None` where every update is made: the sweep of this scene does not
 /// look for what stands still.
 pub fn active_share(plan: &Plan, sweep: &Sweep) -> Option<f64> {
-    let Setup { body, flock, changes, present_radius, .. } = &plan.setup;
+    let Setup { body, flock, changes, present_radius, actions, .. } = &plan.setup;
     let looks = looks_at_every_step(present_radius.is_some(), flock, changes);
-    // A load moves all of a body at once.
-    if looks || flock.forces.is_some() || !sweep.takes_several(body.frame.as_ref()) {
+    // A load moves all of a body at once, and so may an action.
+    if looks || flock.forces.is_some() || !actions.is_empty() || !sweep.takes_several(body.frame.as_ref()) {
         return None;
     }
     let steps = plan.stop.steps;
@@ -27,13 +28,17 @@ pub fn active_share(plan: &Plan, sweep: &Sweep) -> Option<f64> {
 /// The step in which each particle can move first, beyond the last one for those that nothing reaches.
 fn first_motions(plan: &Plan, steps: usize) -> Vec<usize> {
     let mut begins = vec![steps + 1; plan.count()];
-    // Particles that are moved, and those that are released.
+    let (flock, roles) = (&plan.setup.flock, &plan.setup.roles);
+    let is_at_rest = |i: usize| flock.target(i, &flock.reference) == flock.reference.get(i);
+    let unbalanced = (0..plan.count()).filter(|&i| roles[i] == Role::Follower && !is_at_rest(i));
+    // Particles that are moved, those that are released, and those that do not rest where they stand.
     let mut starts: Vec<(usize, usize)> = plan
         .setup
         .changes
         .iter()
         .filter(|change| change.motion.is_some() || change.from > 1)
         .flat_map(|change| change.particles.iter().map(|&particle| (change.from.max(1), particle)))
+        .chain(unbalanced.map(|i| (1, i)))
         .collect();
     starts.sort_unstable();
     let (seen_by, mut to_come) = (seen_by(plan), starts.into_iter().peekable());

@@ -69,8 +69,8 @@ pub fn stepped(plan: &Plan) -> usize {
         + present(plan.setup.free_edge.is_some(), 2 * count)
         + present(plan.setup.flock.forces.is_some(), 16 * count)
         + present(plan.setup.flock.rest.is_some(), 16 * count)
-        // Whether each is broken, and a list of those that may still break.
-        + present(plan.setup.flock.bonds.is_some(), 4 * bonds)
+        // Whether each is broken, and those that may still break: on a lattice few spans of them, of points each pair.
+        + present(plan.setup.flock.bonds.is_some(), if plan.setup.body.numbering.is_some() { 10 } else { 4 } * bonds)
         + present(plan.setup.present_radius.is_some(), 8 * count)
 }
 

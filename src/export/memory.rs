@@ -137,7 +137,8 @@ fn pictures(scene: &Scene, plan: &Plan, moments: usize) -> usize {
     sheets.extend(charts.iter().filter(|(is, _)| *is).map(|(_, height)| bytes([page::WIDTH, *height])));
     sheets.sort_unstable_by(|a, b| b.cmp(a));
     let at_once = rayon::current_num_threads();
-    let dots = if plan.count() <= MOST_DOTS { DOT * plan.count() * at_once.min(moments) } else { 0 };
+    let dots =
+        if plan.count() <= MOST_DOTS { DOT * plan.count() * at_once.min(of_each * moments) } else { 0 };
     let dashes = if plan.setup.flock.bonds.is_some() { DASHES } else { 0 };
     PAINTER + dots + dashes + sheets.iter().take(at_once).map(|one| one + FONTS).sum::<usize>()
 }

@@ -140,7 +140,11 @@ impl Edit {
                 }
             }
             Edit::Rename { robot, name } => {
-                let before = std::mem::replace(&mut raw.robots[known(*robot)?].name, name.clone());
+                let robot = known(*robot)?;
+                if raw.robots.iter().enumerate().any(|(other, raw)| other != robot && raw.name == *name) {
+                    return Err(format!("two robots are called `{name}`: give each a name of its own"));
+                }
+                let before = std::mem::replace(&mut raw.robots[robot].name, name.clone());
                 mentions(raw)
                     .filter(|mention| **mention == before)
                     .for_each(|mention| mention.clone_from(name));

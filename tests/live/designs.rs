@@ -126,6 +126,11 @@ fn designs_that_cannot_fly_are_refused_and_change_nothing() {
     assert!(refused(&mut live, Edit::Rename { robot: 3, name: "a b".into() }).contains("no ROS name"));
     assert!(refused(&mut live, Edit::Move { robot: 99, by: [1.0, 0.0] }).contains("no such robot"));
     assert!(refused(&mut live, Edit::Link { robots: [3, 3] }).contains("itself"));
+    // Whatever is linked to it.
+    for robot in [0, 9] {
+        let words = try_edit(&mut live, Edit::Rename { robot, name: "robot_2".into() }).expect_err("taken");
+        assert!(words.contains("two robots are called `robot_2`"), "{words}");
+    }
     let placed = try_edit(&mut live, Edit::Place { at: [20.0, 20.0], leads: true });
     assert_eq!(placed, Ok(()));
 

@@ -441,7 +441,7 @@ impl Formation {
     }
 
     /// Each member's place of rest with the leaders at their places in `present` \[m\]; `None` where it is not
-    /// [known](NoRest).
+    /// known: the rule is not linear, the leaders do not decide it alone, or it would take long to find.
     pub fn settled(&self, present: &Vectors) -> Option<Vectors> {
         let TargetSource::Rule { particles, .. } = &self.course else { return None };
         let settling = self.settling.as_ref().ok()?;
