@@ -290,7 +290,7 @@ impl Formation {
     }
 
     /// The end of the last program of the swarm's leaders, or when one of them was last sent to a place instead \[s\]. Of a scene's
-    /// own program [`Formation::programs_are_over`] alone knows.
+    /// own program it knows nothing.
     pub fn programs_end(&self) -> f64 {
         let end = |lead: &Lead| match lead {
             Lead::External(_) => 0.0,
