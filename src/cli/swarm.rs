@@ -60,10 +60,10 @@ impl SwarmFileArguments {
         if let Some(bundled) = bundled_swarm(&self.swarm) {
             return Ok(bundled.load_swarm(&self.overrides.set)?);
         }
-        let path = Kind::Swarm.path(&self.swarm)?;
+        // Its file may be gone by now.
         let loaded = match self.text.clone() {
-            Some(text) => Swarm::from_text_of_file(&path, text, &self.overrides.set),
-            None => Swarm::from_file(&path, &self.overrides.set),
+            Some(text) => Swarm::from_text_of_file(Path::new(&self.swarm), text, &self.overrides.set),
+            None => Swarm::from_file(&Kind::Swarm.path(&self.swarm)?, &self.overrides.set),
         };
         loaded.map_err(|error| Kind::Swarm.refuse_other(&self.swarm).unwrap_or(error.into()))
     }

@@ -12,20 +12,27 @@ use super::Neighbour;
 pub fn mean(neighbours: impl Iterator<Item = Neighbour> + Clone) -> Option<[f64; 2]> {
     let total: f64 = neighbours.clone().map(|n| n.weight).sum();
     // What has half of the weight but for rounding has half of it.
-    let half = total * (1.0 - 1e-12);
-    let axis = |k: usize| {
-        let values = || neighbours.clone().map(|n| n.position[k]);
-        let weight = |counts: &dyn Fn(f64) -> bool| {
-            neighbours.clone().filter(|n| counts(n.position[k])).map(|n| n.weight).sum::<f64>()
-        };
-        // Neighbours are few: counting for each of them needs no memory.
-        let low =
-            values().filter(|&v| 2.0 * weight(&|other| other <= v) >= half).fold(f64::INFINITY, f64::min);
-        let high =
-            values().filter(|&v| 2.0 * weight(&|other| other >= v) >= half).fold(f64::NEG_INFINITY, f64::max);
-        0.5 * low + 0.5 * high
+    let half = 0.5 * total * (1.0 - 1e-12);
+    let mut values: Vec<[f64; 2]> = Vec::new();
+    let mut axis = |k: usize| {
+        values.clear();
+        values.extend(
+            neighbours.clone().map(|n| [n.position[k], n.weight]).filter(|[value, _]| !value.is_nan()),
+        );
+        values.sort_unstable_by(|[a, _], [b, _]| a.total_cmp(b));
+        let [low, high] = [half_way(values.iter(), half), half_way(values.iter().rev(), half)];
+        0.5 * low.unwrap_or(f64::INFINITY) + 0.5 * high.unwrap_or(f64::NEG_INFINITY)
     };
     (total > 0.0).then(|| [axis(0), axis(1)])
+}
+
+/// The first of these values, each with its weight, up to which there is half of the weight.
+fn half_way<'a>(mut values: impl Iterator<Item = &'a [f64; 2]>, half: f64) -> Option<f64> {
+    let mut before = 0.0;
+    values.find_map(|&[value, weight]| {
+        before += weight;
+        (before >= half).then_some(value)
+    })
 }
 
 #[cfg(test)]
@@ -62,6 +69,27 @@ mod tests {
         assert_eq!(weighted([2.0, 1.0, 1.0]), Some([1.5, -1.5]));
         assert_eq!(weighted([0.0, 1.0, 0.0]), Some([2.0, -2.0]));
         assert_eq!(weighted([0.0; 3]), None);
+    }
+
+    /// Of many neighbours too, some of them alike: at least half of the weight is not above it, and not below.
+    #[test]
+    fn half_of_the_weight_of_many_is_on_either_side() {
+        let number = |seed: usize| (7919 * seed + 13) % 41;
+        for count in 1..120 {
+            let values: Vec<(f64, f64)> =
+                (0..count).map(|i| (number(i) as f64, (number(i * i) % 5 + 1) as f64)).collect();
+            let all = values.iter().map(|&(x, weight)| Neighbour { weight, ..Neighbour::at([x, -x]) });
+            let [middle, mirrored] = mean(all).expect("weights");
+            let weight = |counts: &dyn Fn(f64) -> bool| {
+                values.iter().filter(|(x, _)| counts(*x)).map(|(_, weight)| weight).sum::<f64>()
+            };
+            let half = 0.5 * weight(&|_| true);
+            assert!(
+                weight(&|x| x <= middle) >= half && weight(&|x| x >= middle) >= half,
+                "{count}: {middle}"
+            );
+            assert_eq!(mirrored, -middle, "{count}");
+        }
     }
 
     #[test]

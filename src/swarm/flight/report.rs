@@ -127,14 +127,14 @@ impl FlightReport {
         let within = number(self.settled_within);
         let settled = match (self.settling_time, self.programs_end) {
             (Some(time), _) => format!("{} s to within {within} m", number(time)),
+            (None, _) if !self.programs_began => {
+                "not measured: the leaders' programs never began, as not all leaders were heard".to_owned()
+            }
             (None, _) if self.affine_error.is_none() && self.formation_error.is_none() => {
                 "not measured: the robots have no place by the leaders' motion, and none of rest is known"
                     .to_owned()
             }
             (None, _) if self.programs_ended => format!("never within {within} m"),
-            (None, _) if !self.programs_began => {
-                "not measured: the leaders' programs never began, as not all leaders were heard".to_owned()
-            }
             (None, Some(end)) => {
                 format!(
                     "not measured: the flight ends before the leaders' programs, which end at {} s",
