@@ -90,16 +90,13 @@ fn life(
 ) -> Result<Result<Option<Life>, ExitCode>, Refusal> {
     match transport {
         Transport::Shm => Ok(Ok(None)),
-        Transport::Ros2 => {
-            let life = supervise(&ros.security, || swarm.read()).map_err(Refusal::Supervise)?;
-            Ok(life.map(Some))
-        }
+        Transport::Ros2 => Ok(supervise(&ros.security, || swarm.read())?.map(Some)),
     }
 }
 
 /// The swarm as its file was when the flight began.
 fn as_begun(swarm: &SwarmFileArguments, life: &mut Option<Life>) -> SwarmFileArguments {
-    swarm.as_read(life.as_mut().and_then(Life::text))
+    swarm.as_read(life.as_mut().and_then(|life| life.text.take()))
 }
 
 /// Keeps a formation until it is interrupted.

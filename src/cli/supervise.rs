@@ -4,7 +4,7 @@
 //! survives exhausted memory. So `node` and `robots` are two processes. This one holds no socket and hardly any memory;
 //! its child does the work and sends its state ten times a second, over the socket that is the child's standard input.
 //! A child that ends without having been asked to, or falls silent, is followed by another at once, which gets that
-//! state first, and before it the text of the swarm's file as it was at the start: what someone writes there meanwhile is for the
+//! state first, and with it the text of the swarm's file as it was at the start: what someone writes there meanwhile is for the
 //! next flight. The alternative, a middleware in a process of its own under a loop that goes on, would be back no
 //! sooner, because finding the peers again takes the time, and a loop without a middleware receives no poses.
 
@@ -21,8 +21,9 @@ use flockform::ros::arguments::Security;
 use flockform::ros::edge::pulse::{MIDDLEWARE_GONE, longest_silence};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde_json::Value;
 
-use super::{BAD_INPUT, interrupt};
+use super::{BAD_INPUT, Refusal, interrupt};
 
 /// Number of a child, from 1, in the environment.
 const LIFE: &str = "FLOCKFORM_LIFE";
@@ -50,33 +51,36 @@ const REST: Duration = Duration::from_secs(1);
 pub struct Life {
     number: u32,
     socket: Option<UnixStream>,
-    /// What was sent before it began: the text of the file, and the state.
-    begun_with: Option<BufReader<UnixStream>>,
+    /// The text of the file when the first process began, where there is one.
+    pub text: Option<String>,
+    /// The last state that the previous process sent.
+    left: Value,
     /// The part of the last state that has not been sent yet.
     unsent: Vec<u8>,
     sent: Option<Instant>,
 }
 
 /// Runs this program again as a child, and another whenever one ends for no reason of its own; returns in the child,
-/// and in this process with the code of the last. All of them work by the `text` that is read here, if there is any.
+/// and in this process with the code of the last. All of them go by the `text` that is read here, if there is any.
 pub fn supervise(
     security: &Security,
-    text: impl FnOnce() -> Option<String>,
-) -> std::io::Result<Result<Life, ExitCode>> {
-    match std::env::var(LIFE).ok().and_then(|number| number.parse().ok()) {
-        Some(number) => Ok(Ok(Life::take_up(number)?)),
-        None => lead(longest_silence(security) + BEYOND_ITS_WATCHDOG, text).map(Err),
-    }
+    text: impl FnOnce() -> Result<Option<String>, Refusal>,
+) -> Result<Result<Life, ExitCode>, Refusal> {
+    let led = match std::env::var(LIFE).ok().and_then(|number| number.parse().ok()) {
+        Some(number) => Life::take_up(number).map(Ok),
+        None => lead(longest_silence(security) + BEYOND_ITS_WATCHDOG, text()?).map(Err),
+    };
+    led.map_err(Refusal::Supervise)
 }
 
-fn lead(silence: Duration, text: impl FnOnce() -> Option<String>) -> std::io::Result<ExitCode> {
+fn lead(silence: Duration, text: Option<String>) -> std::io::Result<ExitCode> {
     let stop = interrupt::serves();
-    let text = [serde_json::to_vec(&text())?, b"\n".to_vec()].concat();
-    let (mut state, mut speechless, mut rest) = (b"null\n".to_vec(), 0, Duration::ZERO);
+    let text = serde_json::to_vec(&text)?;
+    let (mut state, mut speechless, mut rest) = (b"null".to_vec(), 0, Duration::ZERO);
     let (mut has_run, mut given_up_with) = (false, MIDDLEWARE_GONE);
     for number in 1_u32.. {
         let begun = Instant::now();
-        let (mut child, lines) = start(number, [&text[..], &state[..]].concat())?;
+        let (mut child, lines) = start(number, [b"[", &text[..], b",", &state[..], b"]\n"].concat())?;
         let (code, last) = follow(&mut child, lines, silence, stop)?;
         speechless = if last.is_some() { 0 } else { speechless + 1 };
         has_run |= last.is_some();
@@ -109,6 +113,9 @@ fn lead(silence: Duration, text: impl FnOnce() -> Option<String>) -> std::io::Re
             (2 * rest).clamp(LOOK, REST)
         };
         std::thread::sleep(rest);
+        if stop.load(Ordering::Relaxed) {
+            return Ok(ExitCode::SUCCESS);
+        }
     }
     tracing::error!("{speechless} processes in a row ended before they had begun");
     Ok(ExitCode::from(given_up_with))
@@ -127,6 +134,7 @@ fn start(number: u32, begins_with: Vec<u8>) -> std::io::Result<(Child, Lines)> {
     std::thread::spawn(move || {
         // A child that is gone is noticed by its end.
         let _ = writer.write_all(&begins_with);
+        drop(begins_with);
         for line in reader.split(b'\n').map_while(Result::ok) {
             if say.send(line).is_err() {
                 return;
@@ -155,14 +163,12 @@ fn follow(
         (None, Instant::now(), None);
     let (mut before, mut is_ended) = (Instant::now(), false);
     loop {
-        for mut line in lines.try_iter() {
-            line.push(b'\n');
+        for line in lines.try_iter() {
             (last, heard) = (Some(line), Instant::now());
         }
         if let Some(status) = child.try_wait()? {
             // The states it sent just before its end.
-            while let Ok(mut line) = lines.recv_timeout(LOOK) {
-                line.push(b'\n');
+            while let Ok(line) = lines.recv_timeout(LOOK) {
                 last = Some(line);
             }
             return Ok((status.code().and_then(|code| u8::try_from(code).ok()), last));
@@ -199,8 +205,16 @@ impl Life {
     fn take_up(number: u32) -> std::io::Result<Self> {
         use std::os::fd::AsFd;
         let socket = UnixStream::from(std::io::stdin().as_fd().try_clone_to_owned()?);
-        let begun_with = Some(BufReader::new(socket.try_clone()?));
-        Ok(Self { number, socket: Some(socket), begun_with, unsent: Vec::new(), sent: None })
+        socket.set_read_timeout(Some(Duration::from_secs(5)))?;
+        let mut line = Vec::new();
+        let read = BufReader::new(&socket).read_until(b'\n', &mut line);
+        socket.set_nonblocking(true)?;
+        let read = read.map_err(|error| error.to_string()).and_then(|_| parse(&line));
+        let (text, left) = read.unwrap_or_else(|error| {
+            tracing::warn!("what the processes before this one left cannot be read ({error}): starting anew");
+            (None, Value::Null)
+        });
+        Ok(Self { number, socket: Some(socket), text, left, unsent: Vec::new(), sent: None })
     }
 
     /// From 1.
@@ -208,36 +222,14 @@ impl Life {
         self.number
     }
 
-    /// The text of the file when the first process began, to be asked for first.
-    pub fn text(&mut self) -> Option<String> {
-        self.line().unwrap_or_else(|error| {
-            tracing::warn!("what the file held cannot be read ({error}): it is read again");
-            None
-        })
-    }
-
     /// The last state that the previous process sent.
     pub fn left<T: DeserializeOwned>(&mut self) -> Option<T> {
-        let left = self.line();
-        self.begun_with = None;
-        let socket = self.socket.as_ref()?;
-        match socket.set_nonblocking(true).map_err(|error| error.to_string()).and(left) {
-            Ok(left) => left,
-            Err(error) => {
-                tracing::warn!(
-                    "what the process before this one left cannot be read ({error}): starting anew"
-                );
-                None
-            }
-        }
-    }
-
-    fn line<T: DeserializeOwned>(&mut self) -> Result<Option<T>, String> {
-        let Some(begun_with) = &mut self.begun_with else { return Ok(None) };
-        let mut line = Vec::new();
-        let patience = begun_with.get_ref().set_read_timeout(Some(Duration::from_secs(2)));
-        let read = patience.and_then(|()| begun_with.read_until(b'\n', &mut line));
-        read.map_err(|error| error.to_string()).and_then(|_| parse(&line))
+        serde_json::from_value(self.left.take()).unwrap_or_else(|error| {
+            tracing::warn!(
+                "what the process before this one left is none of its states ({error}): starting anew"
+            );
+            None
+        })
     }
 
     /// Sends the state if it is due. Returns false if the socket is closed: the process should end.
@@ -264,6 +256,6 @@ impl Life {
     }
 }
 
-fn parse<T: DeserializeOwned>(line: &[u8]) -> Result<Option<T>, String> {
+fn parse(line: &[u8]) -> Result<(Option<String>, Value), String> {
     serde_json::from_slice(line).map_err(|error| error.to_string())
 }

@@ -16,7 +16,7 @@ use flockform::record::flight::FlightMessages;
 use flockform::record::{About, Shared};
 use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
-use flockform::scene::text::{self, counted};
+use flockform::scene::text::counted;
 use flockform::swarm::control::Control;
 use flockform::swarm::flight::{Flight, FlightReport, Record, Sample, fly_with_observer};
 use flockform::swarm::plan::cautions;
@@ -45,10 +45,15 @@ impl SwarmFileArguments {
         Self { swarm: swarm.to_owned(), overrides: Overrides { set: set.to_vec() }, text: None }
     }
 
-    /// The text of the file; `None` where there is none that can be read, which [`SwarmFileArguments::load`] says.
-    pub fn read(&self) -> Option<String> {
-        let path = bundled_swarm(&self.swarm).is_none().then(|| Kind::Swarm.path(&self.swarm).ok())??;
-        text::read(&path).ok()
+    /// The text of the file; none of a bundled swarm.
+    ///
+    /// # Errors
+    /// Neither file nor name, or a file that cannot be read.
+    pub fn read(&self) -> Result<Option<String>, Refusal> {
+        if bundled_swarm(&self.swarm).is_some() {
+            return Ok(None);
+        }
+        Ok(Some(Swarm::text_of_file(&Kind::Swarm.path(&self.swarm)?)?))
     }
 
     /// The same of a file that had this text when it was read.
@@ -71,7 +76,7 @@ impl SwarmFileArguments {
     /// The description of the swarm for a recording.
     pub fn about(&self, source: &'static str, swarm: &Swarm) -> About {
         let bundled = bundled_swarm(&self.swarm);
-        let text = self.text.clone().or_else(|| self.read());
+        let text = self.text.clone().or_else(|| self.read().ok().flatten());
         let text = bundled.map_or(text, |one| Some(one.text.to_owned()));
         About {
             source,

@@ -33,7 +33,7 @@ pub fn decimals(value: f64, places: usize) -> String {
 ///
 /// # Errors
 /// A file that cannot be read, is longer, or is not UTF-8.
-pub fn read(path: &Path) -> Result<String> {
+pub(crate) fn read(path: &Path) -> Result<String> {
     read_at_most(path, MOST_BYTES)
 }
 

@@ -23,9 +23,16 @@ impl Swarm {
     /// # Errors
     /// Every key that is unknown, missing, out of range or at odds with another, with its line.
     pub fn from_file(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        Self::from_text_of_file(path, Self::text_of_file(path)?, overrides)
+    }
+
+    /// The text of a swarm file.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or is no text.
+    pub fn text_of_file(path: &Path) -> Result<String, SceneError> {
         let help = "give the path of a swarm file, or a name that `flockform list swarms` lists";
-        let File { text, .. } = File::read(path, help)?;
-        Self::from_text_of_file(path, text, overrides)
+        Ok(File::read(path, help)?.text)
     }
 
     /// The same of a file whose text has been read.

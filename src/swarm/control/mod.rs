@@ -547,7 +547,9 @@ impl Control {
         let time = self.program_time();
         let seen = Seen { present: &self.present, known: &self.known };
         let mut among = Vec::new();
-        for member in (0..self.formation.count()).filter(|&m| self.usable[m] && !self.formation.leads(m)) {
+        let leaves_out = self.max_faulty > 0 || self.usable.contains(&false);
+        let follows = |&m: &usize| leaves_out && self.usable[m] && !self.formation.leads(m);
+        for member in (0..self.formation.count()).filter(follows) {
             if let Some(one) = self.formation.among(member, &self.usable, self.max_faulty) {
                 self.flags[member] |= if one.is_one_lost { Flags::NEIGHBOUR_LOST } else { 0 };
                 among.push(one);

@@ -142,32 +142,25 @@ impl Formation {
         let TargetSource::Rule { engine, particles } = &self.course else { return None };
         let frame = engine.body().frame.as_ref();
         let member_of = |particle: u32| particles.binary_search(&(particle as usize)).ok();
-        let mut among = Among {
-            member,
-            is_one_lost: false,
-            is_trimmed: false,
-            heard: Vec::new(),
-            points: Vec::new(),
-            liars,
-        };
-        for &k in engine.flock().neighbours.of(particles[member]) {
+        let is_seen = |k: u32| {
             let point = frame.and_then(|frame| Some((frame, frame.points.binary_search(&k).ok()?)));
-            let is_known = match point {
-                Some((frame, number)) => frame
-                    .served_by(number)
-                    .iter()
-                    .filter_map(|&served| member_of(served))
-                    .all(|m| is_heard[m]),
-                None => member_of(k).is_none_or(|m| is_heard[m]),
-            };
-            among.is_one_lost |= !is_known;
-            match member_of(k).filter(|_| is_known) {
-                Some(neighbour) => among.heard.push(neighbour),
-                None if is_known && liars == 0 => among.points.push(k),
-                None => {}
+            let is_heard = |m: usize| is_heard[m];
+            match point {
+                Some((frame, number)) => {
+                    frame.served_by(number).iter().filter_map(|&k| member_of(k)).all(is_heard)
+                }
+                None => member_of(k).is_none_or(is_heard),
             }
+        };
+        let near = engine.flock().neighbours.of(particles[member]);
+        let is_one_lost = !near.iter().all(|&k| is_seen(k));
+        if !is_one_lost && liars == 0 {
+            return None;
         }
-        (among.is_one_lost || liars > 0).then_some(among)
+        let seen = || near.iter().copied().filter(|&k| is_seen(k));
+        let heard = seen().filter_map(member_of).collect();
+        let points = seen().filter(|&k| liars == 0 && member_of(k).is_none()).collect();
+        Some(Among { member, is_one_lost, is_trimmed: false, heard, points, liars })
     }
 
     /// Members whose positions the member's target depends on.

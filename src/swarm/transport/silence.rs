@@ -1,8 +1,9 @@
 //! Warnings of robots that are not heard.
 
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use crate::swarm::control::Control;
+use crate::swarm::control::{Control, Mode};
 use crate::swarm::formation::first_few;
 
 /// Time without a pose after which the log says so.
@@ -11,15 +12,26 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// The robots of which no pose has been believed yet, or none that is not too old by now.
 #[derive(Clone, Debug, Default)]
 pub struct Silence {
-    missing: Vec<usize>,
-    /// Since when it is these.
-    since: Option<Instant>,
+    /// By the number of the robot; none of one that is heard.
+    missing: BTreeMap<usize, Missing>,
+    /// When the last line was written.
+    last: Option<Instant>,
+    /// Since when none has come at all.
+    silent: Option<Instant>,
+}
+
+/// A robot that is missing, or has been a moment ago.
+#[derive(Clone, Copy, Debug)]
+struct Missing {
+    since: Instant,
+    /// Since when it is heard again.
+    heard: Option<Instant>,
     is_said: bool,
 }
 
 impl Silence {
-    /// Warns once where the same of the robots that are `heard` have been missing for some seconds. `topic` names those of
-    /// robots' poses.
+    /// Warns once of each of the robots that are to be `heard` and have been missing for some seconds, and again only of one that has
+    /// been heard for as long meanwhile. `topic` names those of robots' poses.
     pub fn look(&mut self, control: &Control, heard: &[usize], topic: &dyn Fn(&[usize]) -> String) {
         if let Some(text) = self.text(control, heard, topic, Instant::now()) {
             tracing::warn!("{text}");
@@ -34,35 +46,57 @@ impl Silence {
         now: Instant,
     ) -> Option<String> {
         let watch = control.watch();
-        let is_heard = |m: usize| watch.place(m).is_some() && control.health(m).is_usable();
-        let missing = heard.iter().copied().filter(|&m| !is_heard(m));
-        if self.since.is_none() || !missing.clone().eq(self.missing.iter().copied()) {
-            *self = Self { missing: missing.collect(), since: Some(now), is_said: false };
-        }
-        let since = self.since?;
-        if self.is_said || self.missing.is_empty() || now.duration_since(since) < PATIENCE {
-            return None;
-        }
-        self.is_said = true;
+        let is_past = |since: Instant| now.duration_since(since) >= PATIENCE;
         let seconds = PATIENCE.as_secs();
         let has_come = |&m: &usize| watch.counts(m).accepted + watch.counts(m).rejected() > 0;
         if !heard.iter().any(has_come) {
-            return Some(format!(
-                "no pose has come for {seconds} s, on {}: no robot is sent a target before",
-                topic(heard)
-            ));
+            let is_due = !heard.is_empty() && is_past(*self.silent.get_or_insert(now)) && self.last.is_none();
+            return is_due.then(|| {
+                self.last = Some(now);
+                let topic = topic(heard);
+                format!("no pose has come for {seconds} s, on {topic}: no robot is sent a target before")
+            });
         }
-        let (leaders, followers): (Vec<usize>, Vec<usize>) =
-            self.missing.iter().partition(|&&m| control.formation().leads(m));
-        let (robots, what) = match (control.has_begun(), leaders.is_empty()) {
-            _ if self.missing == heard => (self.missing.clone(), "no robot is sent a target"),
-            (false, false) => (leaders, "the programs of the leaders wait, and no robot moves before"),
-            (true, false) => (self.missing.clone(), "the swarm flies without"),
-            (_, true) => (followers, "the swarm flies without"),
+        for &m in heard {
+            if watch.place(m).is_none() || !control.health(m).is_usable() {
+                let one = Missing { since: now, heard: None, is_said: false };
+                let one = self.missing.entry(m).or_insert(one);
+                one.since = if one.heard.take().is_some() { now } else { one.since };
+            } else if let Some(one) = self.missing.get_mut(&m)
+                && is_past(*one.heard.get_or_insert(now))
+            {
+                self.missing.remove(&m);
+            }
+        }
+        let gone = |m: &usize| self.missing.get(m).is_some_and(|one| one.heard.is_none());
+        let awaited: Vec<usize> = heard
+            .iter()
+            .copied()
+            .filter(|&m| control.formation().leads(m) && watch.place(m).is_none())
+            .collect();
+        let waits = !control.has_begun() && !awaited.is_empty();
+        let is_due = |m: &usize| {
+            self.missing.get(m).is_some_and(|one| one.heard.is_none() && !one.is_said && is_past(one.since))
         };
+        // Without its leaders nothing moves: the others are of no matter before.
+        let due: Vec<usize> =
+            heard.iter().copied().filter(is_due).filter(|m| !waits || awaited.contains(m)).collect();
+        if due.is_empty() || self.last.is_some_and(|last| !is_past(last)) {
+            return None;
+        }
+        let what = match control.mode() {
+            _ if waits => "the programs of the leaders wait, and no robot moves before",
+            _ if heard.iter().all(gone) => "no robot is sent a target",
+            Mode::Running => "the swarm flies without",
+            Mode::EmergencyStopped | Mode::Inactive => "the swarm stands without",
+        };
+        self.last = Some(now);
+        for m in &due {
+            self.missing.entry(*m).and_modify(|one| one.is_said = true);
+        }
         let names = &control.formation().names;
-        let of = first_few(robots.iter().map(|&m| names[m].clone()))?;
-        Some(format!("no pose of {of} has been believed for {seconds} s, on {}: {what}", topic(&robots)))
+        let of = first_few(due.iter().map(|&m| names[m].clone()))?;
+        Some(format!("no pose of {of} has been believed for {seconds} s, on {}: {what}", topic(&due)))
     }
 }
 
