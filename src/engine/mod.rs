@@ -294,7 +294,12 @@ impl Engine {
             self.advance_by(1, None);
             return;
         }
-        self.gather_seen();
+        // Particles that take a role are where they are then, in both buffers, also where steps together move them along.
+        if self.takes_roles_next() {
+            self.gather()
+        } else {
+            self.gather_seen()
+        }
         if let Some(before) = before.as_deref_mut().filter(|_| self.acts_next()) {
             before.note_all(self);
         }

@@ -119,6 +119,11 @@ impl Engine {
         most.min(until).min(self.sweep.steps_together().saturating_sub(self.spare_bands()))
     }
 
+    /// Whether particles take a role at the next step whatever the body does.
+    pub(super) fn takes_roles_next(&self) -> bool {
+        self.changes.iter().any(|change| change.when.is_none() && change.from == self.step + 1)
+    }
+
     /// Bands that are to be known beyond those that steps taken together need: the ones that probes look at after the last.
     fn spare_bands(&self) -> usize {
         usize::from(self.probes.is_some() && self.sweep.domain().is_some())

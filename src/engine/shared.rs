@@ -309,7 +309,7 @@ pub(crate) fn of_all_parts(
 /// The particles that those of a part see in a step that is taken by itself, as numbers of those that stand here; all of these where
 /// points of a frame see some as well.
 pub(crate) fn seen_in_a_step(body: &Body, neighbours: &Neighbours) -> Range<usize> {
-    if body.frame.is_some() { 0..body.count() } else { neighbours.seen_from(body.owned()) }
+    if body.frame.is_some() { body.exact() } else { neighbours.seen_from(body.owned()) }
 }
 
 /// Receives positions of others.

@@ -261,6 +261,22 @@ fn probes_of_a_body_in_parts_are_those_of_a_run_alone() {
     }
 }
 
+/// Those of other parts as well, which steps together move along, wherever they have come by then.
+#[test]
+fn roles_that_are_taken_at_a_step_between_steps_together_are_taken_where_the_particles_are() {
+    let body = "body.shape={kind=\"grid\",columns=120,rows=9}";
+    let some = "region={kind=\"box\",min=[9.5,-1.0],max=[110.5,3.5]},from=21";
+    for role in ["role=\"clamped\"", "role=\"leader\",motion={kind=\"velocity\",per_step=[0.01,0.03]}"] {
+        let roles = format!(
+            "roles=[{{region={{kind=\"edge\",side=\"left\"}},role=\"clamped\"}},\
+             {{region={{kind=\"box\",min=[9.5,6.5],max=[110.5,7.5]}},role=\"leader\",\
+             motion={{kind=\"velocity\",per_step=[0.05,0.02]}}}},{{{some},{role}}}]"
+        );
+        let sets = [body, "frame=none", "record.probes=[]", "record.figures=[]", "stop.steps=80", &roles];
+        assert_parted_the_same("tension", &sets, 40);
+    }
+}
+
 #[test]
 fn what_is_found_on_the_way_of_a_body_in_parts_is_what_a_run_alone_finds() {
     let probes = "record.probes=[1,30,60,61,100]";

@@ -20,18 +20,19 @@ pub fn mean(neighbours: impl Iterator<Item = Neighbour> + Clone) -> Option<[f64;
             neighbours.clone().map(|n| [n.position[k], n.weight]).filter(|[value, _]| !value.is_nan()),
         );
         values.sort_unstable_by(|[a, _], [b, _]| a.total_cmp(b));
-        let [low, high] = [half_way(values.iter(), half), half_way(values.iter().rev(), half)];
+        let alike = || values.chunk_by(|[a, _], [b, _]| a == b);
+        let [low, high] = [half_way(alike(), half), half_way(alike().rev(), half)];
         0.5 * low.unwrap_or(f64::INFINITY) + 0.5 * high.unwrap_or(f64::NEG_INFINITY)
     };
     (total > 0.0).then(|| [axis(0), axis(1)])
 }
 
-/// The first of these values, each with its weight, up to which there is half of the weight.
-fn half_way<'a>(mut values: impl Iterator<Item = &'a [f64; 2]>, half: f64) -> Option<f64> {
-    let mut before = 0.0;
-    values.find_map(|&[value, weight]| {
-        before += weight;
-        (before >= half).then_some(value)
+/// The first of these values, each given as often as there are weights of it, up to which there is half of the weight.
+fn half_way<'a>(mut alike: impl Iterator<Item = &'a [[f64; 2]]>, half: f64) -> Option<f64> {
+    let mut weight = 0.0;
+    alike.find_map(|values| {
+        weight += values.iter().map(|[_, weight]| weight).sum::<f64>();
+        (weight >= half).then_some(values[0][0])
     })
 }
 
@@ -89,6 +90,16 @@ mod tests {
                 "{count}: {middle}"
             );
             assert_eq!(mirrored, -middle, "{count}");
+        }
+    }
+
+    /// Whatever their order.
+    #[test]
+    fn values_that_are_alike_count_together() {
+        for weights in [[2.0, -2.0], [-2.0, 2.0]] {
+            let all = [(0.0, weights[0]), (0.0, weights[1]), (-1.0, 1.0), (1.0, 2.0)].into_iter();
+            let all = all.map(|(x, weight)| Neighbour { weight, ..Neighbour::at([x, x]) });
+            assert_eq!(mean(all), Some([1.0; 2]), "{weights:?}");
         }
     }
 
