@@ -12,7 +12,7 @@ use crate::material::stress::StressState;
 use crate::scene::Scene;
 
 /// Bytes of what a program adds to its own once it runs a body: code that has not run yet, stacks, tables.
-const RUNNING: usize = 3 << 20;
+const RUNNING: usize = 15 << 18;
 
 /// Bytes of a particle in a [`Snapshot`](crate::continuum::record::Snapshot): position, role and energies.
 const SNAPSHOT: usize = 16 + 1 + 2 * 8;
@@ -137,8 +137,9 @@ fn pictures(scene: &Scene, plan: &Plan, moments: usize) -> usize {
     sheets.extend(charts.iter().filter(|(is, _)| *is).map(|(_, height)| bytes([page::WIDTH, *height])));
     sheets.sort_unstable_by(|a, b| b.cmp(a));
     let at_once = rayon::current_num_threads();
-    let dots =
-        if plan.count() <= MOST_DOTS { DOT * plan.count() * at_once.min(of_each * moments) } else { 0 };
+    // Of a lattice contours are drawn of energies, of points each as a dot as well.
+    let of_dots = if body.numbering.is_some() { of_each * moments } else { moments };
+    let dots = if plan.count() <= MOST_DOTS { DOT * plan.count() * at_once.min(of_dots) } else { 0 };
     let dashes = if plan.setup.flock.bonds.is_some() { DASHES } else { 0 };
     PAINTER + dots + dashes + sheets.iter().take(at_once).map(|one| one + FONTS).sum::<usize>()
 }
