@@ -76,8 +76,8 @@ impl SwarmFileArguments {
     /// The description of the swarm for a recording.
     pub fn about(&self, source: &'static str, swarm: &Swarm) -> About {
         let bundled = bundled_swarm(&self.swarm);
-        let text = self.text.clone().or_else(|| self.read().ok().flatten());
-        let text = bundled.map_or(text, |one| Some(one.text.to_owned()));
+        let of_file = || self.text.clone().or_else(|| self.read().ok().flatten());
+        let text = bundled.map_or_else(of_file, |one| Some(one.text.to_owned()));
         About {
             source,
             name: swarm.name.clone(),

@@ -141,11 +141,9 @@ impl Engine {
             let led = Led { particles: &self.led, places: &self.leaders_ahead(each) };
             let frame = self.body.frame.as_ref();
             let steps = self.sweep.steps_to_take(&self.flock, frame, (each, led, farther), beyond);
-            let ranks = self
-                .team
-                .as_ref()
-                .zip(self.sweep.domain())
-                .filter(|_| taken == 0 && self.known != Known::All);
+            // A step by itself may have been made ready for already.
+            let is_known = self.known == Known::All || (self.known == Known::Seen && count + spare == 1);
+            let ranks = self.team.as_ref().zip(self.sweep.domain()).filter(|_| taken == 0 && !is_known);
             let halo = ranks.map(|((team, _), domain)| (team, domain.halo(count + spare)));
             let places = [&mut self.present, &mut self.previous];
             moved.extend(take_steps(&steps, (halo, beyond), places, &mut self.activity));

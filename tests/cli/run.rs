@@ -573,7 +573,7 @@ fn the_swarm_bench_says_in_json_what_a_tick_costs_and_how_long_a_target_takes() 
 
 /// Of a rule without rest offsets the ends of a body move from the first step on, and an action may move all of it.
 #[test]
-fn a_plan_foretells_how_much_of_the_work_is_done_where_nothing_rests_at_first() {
+fn a_plan_predicts_how_much_of_the_work_is_done_where_nothing_rests_at_first() {
     let scene = "title = \"a strip\"\nunit = \"m\"\n[lattice]\nkind = \"square\"\nspacing = 1.0\n[body]\n\
                  shape = { kind = \"grid\", columns = 600, rows = 100 }\n[[roles]]\nregion = { kind = \"edge\", side = \"right\" }\n\
                  role = \"leader\"\nmotion = { kind = \"velocity\", per_step = [0.01, 0.0] }\n[stop]\nsteps = 60\n";
@@ -594,13 +594,13 @@ fn a_plan_foretells_how_much_of_the_work_is_done_where_nothing_rests_at_first() 
         let run = output(&["run", "s.toml", "--out", "o", "--figures", "none", "--no-report", "--json"]);
         let run: serde_json::Value = serde_json::from_str(&run).expect("JSON");
         let share = 100.0 * run["share_swept"].as_f64().expect("a number");
-        let foretold = plan.lines().find(|line| line.contains("of the updates"));
-        assert_eq!(foretold.is_some(), is_known, "{more}: {plan}");
+        let predicted = plan.lines().find(|line| line.contains("of the updates"));
+        assert_eq!(predicted.is_some(), is_known, "{more}: {plan}");
         let number =
             |line: &str| line.split_whitespace().find_map(|word| word.parse::<f64>().ok()).expect("a number");
         assert!(
-            foretold.is_none_or(|line| (number(line) - share).abs() < 0.15 * share + 3.0),
-            "{more}: {foretold:?}, {share}"
+            predicted.is_none_or(|line| (number(line) - share).abs() < 0.15 * share + 3.0),
+            "{more}: {predicted:?}, {share}"
         );
     }
 }

@@ -140,24 +140,14 @@ impl Formation {
     /// What a follower goes by where it leaves some of its neighbours out; `None` if it goes by all that it looks at.
     pub(in crate::swarm) fn among(&self, member: usize, is_heard: &[bool], liars: usize) -> Option<Among> {
         let TargetSource::Rule { engine, particles } = &self.course else { return None };
-        let frame = engine.body().frame.as_ref();
-        let member_of = |particle: u32| particles.binary_search(&(particle as usize)).ok();
-        let is_seen = |k: u32| {
-            let point = frame.and_then(|frame| Some((frame, frame.points.binary_search(&k).ok()?)));
-            let is_heard = |m: usize| is_heard[m];
-            match point {
-                Some((frame, number)) => {
-                    frame.served_by(number).iter().filter_map(|&k| member_of(k)).all(is_heard)
-                }
-                None => member_of(k).is_none_or(is_heard),
-            }
-        };
         let near = engine.flock().neighbours.of(particles[member]);
-        let is_one_lost = !near.iter().all(|&k| is_seen(k));
+        let is_seen = |k: &u32| shown_by(engine, particles, k).all(|m| is_heard[m]);
+        let is_one_lost = !near.iter().all(is_seen);
         if !is_one_lost && liars == 0 {
             return None;
         }
-        let seen = || near.iter().copied().filter(|&k| is_seen(k));
+        let member_of = |k: u32| particles.binary_search(&(k as usize)).ok();
+        let seen = || near.iter().filter(|k| is_seen(k)).copied();
         let heard = seen().filter_map(member_of).collect();
         let points = seen().filter(|&k| liars == 0 && member_of(k).is_none()).collect();
         Some(Among { member, is_one_lost, is_trimmed: false, heard, points, liars })
@@ -166,19 +156,12 @@ impl Formation {
     /// Members whose positions the member's target depends on.
     pub fn depends_on(&self, member: usize) -> Vec<usize> {
         let TargetSource::Rule { engine, particles } = &self.course else { return Vec::new() };
-        let frame = engine.body().frame.as_ref();
-        let mut seen = Vec::new();
-        for &k in engine.flock().neighbours.of(particles[member]) {
-            let point = frame.and_then(|frame| Some((frame, frame.points.binary_search(&k).ok()?)));
-            match point {
-                Some((frame, number)) => seen.extend(frame.served_by(number)),
-                None => seen.push(k),
-            }
-        }
+        let near = engine.flock().neighbours.of(particles[member]);
+        let mut seen: Vec<usize> = near.iter().flat_map(|k| shown_by(engine, particles, k)).collect();
         seen.sort_unstable();
         seen.dedup();
-        let member_of = |particle: u32| particles.binary_search(&(particle as usize)).ok();
-        seen.into_iter().filter_map(member_of).filter(|&other| other != member).collect()
+        seen.retain(|&other| other != member);
+        seen
     }
 
     /// Number of steps after which a scene's or a recording's program is over.
@@ -491,6 +474,14 @@ impl Formation {
             self.settling = Settling::of(engine).map(Arc::new);
         }
     }
+}
+
+/// The members whose places a particle shows: its own, or those that a point of the frame copies.
+fn shown_by<'a>(engine: &'a Engine, particles: &'a [usize], k: &'a u32) -> impl Iterator<Item = usize> + 'a {
+    let frame = engine.body().frame.as_ref();
+    let copied = frame.and_then(|frame| Some(frame.served_by(frame.points.binary_search(k).ok()?)));
+    let shown = copied.unwrap_or(std::slice::from_ref(k));
+    shown.iter().filter_map(|&i| particles.binary_search(&(i as usize)).ok())
 }
 
 /// A follower that goes by some of its neighbours alone: the others are lost, or not believed.

@@ -66,8 +66,10 @@ impl Settling {
         leaders.iter().enumerate().for_each(|(n, &i)| number[i] = Some(n));
         let (k_ff, k_fl, forces) = dense(engine, &system, &followers, leaders.len(), &number, &follows);
         let factors = (!followers.is_empty()).then(|| k_ff.lu());
-        let solved =
-            |right: DMatrix<f64>| factors.as_ref().map_or(Some(right.clone()), |lu| lu.solve(&right));
+        let solved = |right: DMatrix<f64>| match &factors {
+            Some(factors) => factors.solve(&right),
+            None => Some(right),
+        };
         let (answer, offset) = solved(k_fl).zip(solved(forces)).ok_or(NoRest::Undecided)?;
         let is_finite = answer.iter().chain(offset.iter()).all(|value| value.is_finite());
         if is_finite { Ok(Self { number, follows, leaders, answer, offset }) } else { Err(NoRest::Undecided) }

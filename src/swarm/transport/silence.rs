@@ -91,8 +91,8 @@ impl Silence {
             Mode::EmergencyStopped | Mode::Inactive => "the swarm stands without",
         };
         self.last = Some(now);
-        for m in &due {
-            self.missing.entry(*m).and_modify(|one| one.is_said = true);
+        for (m, one) in &mut self.missing {
+            one.is_said |= due.contains(m);
         }
         let names = &control.formation().names;
         let of = first_few(due.iter().map(|&m| names[m].clone()))?;
