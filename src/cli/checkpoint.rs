@@ -11,7 +11,7 @@ use flockform::engine::Engine;
 use flockform::engine::state::EngineState;
 use flockform::export::checkpoint::{Checkpoint, CheckpointError, RunRequest};
 use flockform::export::report::RunRecorder;
-use flockform::export::{ExportError, OutputFolder, VtkSeries, unfinished};
+use flockform::export::{Drawn, ExportError, OutputFolder, VtkSeries, unfinished};
 use flockform::scene::Scene;
 
 use super::interrupt;
@@ -129,8 +129,9 @@ impl ResumedRun {
 
     /// Steps whose configurations are to be drawn and were not kept, as no figures were asked for then.
     pub fn undrawn(&self, scene: &Scene) -> Vec<usize> {
-        let (step, kept) = (self.checkpoint.engine.step(), &self.checkpoint.snapshots);
-        let is_missing = |figure: &usize| *figure <= step && kept.iter().all(|one| one.step != *figure);
+        let Checkpoint { engine, snapshots, drawn, .. } = &self.checkpoint;
+        let kept = || snapshots.iter().map(|one| one.step).chain(drawn.iter().map(|one| one.step));
+        let is_missing = |figure: &usize| *figure <= engine.step() && kept().all(|one| one != *figure);
         scene.record.figures.iter().copied().filter(is_missing).collect()
     }
 
@@ -155,6 +156,7 @@ impl ResumedRun {
 /// The records so far.
 pub struct Recorded<'a> {
     pub snapshots: &'a [Snapshot],
+    pub drawn: &'a [Drawn],
     pub probes: &'a [ProbeSeries],
     pub load_steps: &'a [LoadStep],
     pub animation: Option<&'a RunRecorder>,
@@ -278,7 +280,7 @@ impl<'a> Checkpointer<'a> {
         let animation = kept.animation.map(RunRecorder::animation_state);
         // All ranks have the same rows; a run is gone on with by those of the first.
         let load_steps = if folder.is_some() { kept.load_steps } else { &[] };
-        let recorded = (kept.snapshots, kept.probes, load_steps, animation);
+        let recorded = (kept.snapshots, kept.drawn, kept.probes, load_steps, animation);
         let state = (EngineState::of(engine), residual);
         let mut checkpoint = Checkpoint::new(of, state, recorded, self.stepping());
         if let Some(team) = engine.parted() {

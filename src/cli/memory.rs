@@ -23,10 +23,9 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs) -> usize {
     running.max(own("VmHWM:").unwrap_or(0) as usize)
 }
 
-/// Bytes that one of so many ranks, with this part of a body, takes at its largest, its tables among them, and what the first one
-/// keeps for a report.
-pub fn of_part(scene: &Scene, plan: &Plan, ranks: usize, report: bool) -> usize {
-    flockform::export::memory::of_part(scene, plan, (ranks, report), code())
+/// Bytes that one of so many ranks, with this part of a body, takes at its largest, with what the first one keeps for these outputs.
+pub fn of_part(scene: &Scene, plan: &Plan, ranks: usize, outputs: Outputs) -> usize {
+    flockform::export::memory::of_part(scene, plan, (ranks, outputs), code())
 }
 
 /// Bytes of the program's code so far; a guess where the system does not say.

@@ -247,11 +247,18 @@ pub enum Refusal {
     #[error("{0}")]
     Checkpoint(#[from] export::checkpoint::CheckpointError),
     #[error(
-        "there is no {kinds} file and no bundled {kinds} `{name}`\n  help: {}see {} for all of them",
+        "there is no {}bundled {kinds} `{name}`{}\n  help: {}see {} for all of them",
+        if *.takes_files { format!("{kinds} file and no ") } else { String::new() },
+        if *.takes_files { "" } else { ", and no file is taken here" },
         .nearest.map_or_else(String::new, |(kind, nearest)| format!("the nearest bundled {kind} is `{nearest}`; ")),
         .kinds.lists()
     )]
-    NotBundled { kinds: names::Kinds, name: String, nearest: Option<(&'static str, &'static str)> },
+    NotBundled {
+        kinds: names::Kinds,
+        name: String,
+        takes_files: bool,
+        nearest: Option<(&'static str, &'static str)>,
+    },
     #[error("`{name}` is a {kind}\n  help: `flockform {command} {name}`")]
     OtherKind { name: String, kind: &'static str, command: &'static str },
     #[error(

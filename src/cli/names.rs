@@ -85,7 +85,7 @@ impl Kind {
     /// A word that is neither a path nor a bundled name.
     pub fn of_either(word: &str) -> Result<Self, Refusal> {
         match Kind::of(word) {
-            None if !is_path(word) => Err(not_bundled(&Kind::ALL, word)),
+            None if !is_path(word) => Err(not_found(&Kind::ALL, word)),
             kind => Ok(kind.unwrap_or(Kind::Scene)),
         }
     }
@@ -105,7 +105,7 @@ impl Kind {
         if is_path(word) {
             return Ok(PathBuf::from(word));
         }
-        Err(self.refuse_other(word).unwrap_or_else(|| not_bundled(&[self], word)))
+        Err(self.refuse_other(word).unwrap_or_else(|| not_found(&[self], word)))
     }
 }
 
@@ -120,14 +120,23 @@ pub fn folder_in_full(word: &str) -> Option<PathBuf> {
     std::path::absolute(folder_of(word)?.join(".")).ok()
 }
 
-/// The error for a word that is no name of a bundled file of these kinds.
+/// The error for a word that is neither a file nor the name of a bundled one of these kinds.
+fn not_found(kinds: &[Kind], word: &str) -> Refusal {
+    refusal_of(kinds, word, true)
+}
+
+/// The error of a command that takes names of bundled files alone, of these kinds.
 pub fn not_bundled(kinds: &[Kind], word: &str) -> Refusal {
+    refusal_of(kinds, word, false)
+}
+
+fn refusal_of(kinds: &[Kind], word: &str, takes_files: bool) -> Refusal {
     let named = |kind: Kind| kind.bundled().iter().map(|one| one.name).collect::<Vec<_>>();
     let all: Vec<&str> = kinds.iter().flat_map(|&kind| named(kind)).collect();
     let nearest = renamed(word, &all).or_else(|| nearest(word, &all));
     let kind = |name: &str| kinds.iter().find(|kind| named(**kind).contains(&name));
     let nearest = nearest.and_then(|name| Some((kind(name)?.name(), name)));
-    Refusal::NotBundled { kinds: Kinds(kinds.to_vec()), name: word.to_owned(), nearest }
+    Refusal::NotBundled { kinds: Kinds(kinds.to_vec()), name: word.to_owned(), takes_files, nearest }
 }
 
 /// Kinds in words: `scene or swarm`.

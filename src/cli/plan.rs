@@ -6,6 +6,7 @@ use flockform::continuum::parts::laid_out_whole_for;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::report::PlanReport;
 use flockform::continuum::shares::{PartShares, Shares};
+use flockform::export::figures::{Formats, is_raster};
 use flockform::export::memory::Outputs;
 use flockform::scene::Scene;
 use flockform::study::compare::run::plan as plan_of;
@@ -48,10 +49,13 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
             let parts = |scene: &Scene| if laid_out_whole_for(scene).is_none() { count } else { 1 };
             let scene = SceneArguments::new(file, set).load_part(&[], parts)?;
             let parts = PartShares::new(&scene, count)?;
-            let of_part = |parts: &PartShares| {
-                [true, false].map(|report| of_part(&scene, &parts.largest, count, report))
-            };
-            let of_parts = parts.map(|parts| parts.facts(of_part(&parts)));
+            let of_parts = parts.map(|parts| {
+                let are_drawn = is_raster(parts.total());
+                let figures = if are_drawn { Formats::All } else { Formats::None };
+                let outputs = [Outputs { figures, report: true }, Outputs::TABLES];
+                let bytes = outputs.map(|outputs| of_part(&scene, &parts.largest, count, outputs));
+                parts.facts(bytes, are_drawn)
+            });
             if let (Some(facts), Err(too_large)) = (&of_parts, require(&scene, at_least(&scene))) {
                 // What is said of the whole would take the memory that it takes.
                 let facts = facts.iter().map(|(name, value)| json!({ "name": name, "value": value }));

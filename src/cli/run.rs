@@ -13,11 +13,12 @@ use clap::Args;
 use flockform::continuum::digest::{digest, digest_of_parts, fnv1a};
 use flockform::continuum::equilibrium::run_to_equilibrium_shared;
 use flockform::continuum::looks::Looks;
-use flockform::continuum::parts::laid_out_whole_for;
+use flockform::continuum::parts::{Parting, laid_out_whole_for};
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{SharedError, StopReason, require_shareable};
 use flockform::continuum::shares::bytes_each;
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
+use flockform::export::figures::is_raster;
 use flockform::export::film;
 use flockform::export::memory::Outputs;
 use flockform::export::report;
@@ -106,23 +107,27 @@ impl Prepared {
         let mut left = arguments.checkpoints.left()?;
         let asked = arguments.asked(left.as_ref());
         let words_of = SceneArguments::new(&asked.scene, &asked.set);
-        let parts = |scene: &Scene| if arguments.is_parted(scene) { team.map_or(1, Team::count) } else { 1 };
+        let may_be_parted = |scene: &Scene| team.is_some() && arguments.may_be_parted(scene);
+        let parts = |scene: &Scene| if may_be_parted(scene) { team.map_or(1, Team::count) } else { 1 };
         let scene = words_of.load_part(&[], parts)?;
         // Before a choice, which solves the scene several times.
         if team.is_some() {
             require_shareable(&scene)?;
         }
-        let is_parted = team.is_some() && arguments.is_parted(&scene);
-        if let (Some(team), true) = (team, is_parted) {
+        if let (Some(team), true) = (team, may_be_parted(&scene)) {
             // What follows all ranks do together.
             begin.agree(arguments.common(&scene))?;
-            let scene = interruptible(scene);
-            let plan = Plan::of_part(&scene, team)?;
-            let digest = digest_of_parts(&plan, team);
-            let bytes = memory::of_part(&scene, &plan, team.count(), arguments.outputs().report);
-            memory::require(&scene, (ranks::others_here() + 1) as f64 * bytes as f64)?;
-            left.as_mut().map_or(Ok(()), |left| left.fit(&scene, &plan, digest))?;
-            return Ok(Self { left, asked, scene, words: String::new(), plan, digest, is_parted });
+            let parting = Parting::among(&scene, team)?;
+            // In a small body each particle is drawn, which takes all of them.
+            if !arguments.outputs().draws() || is_raster(parting.total()) {
+                let scene = interruptible(scene);
+                let plan = Plan::of_counted_part(&scene, &parting, team)?;
+                let digest = digest_of_parts(&plan, team);
+                let bytes = memory::of_part(&scene, &plan, team.count(), arguments.outputs());
+                memory::require(&scene, (ranks::others_here() + 1) as f64 * bytes as f64)?;
+                left.as_mut().map_or(Ok(()), |left| left.fit(&scene, &plan, digest))?;
+                return Ok(Self { left, asked, scene, words: String::new(), plan, digest, is_parted: true });
+            }
         }
         let Chosen { scene, words, .. } = choose(scene, &|more: &[String]| words_of.load_scene(more))?;
         let scene = interruptible(scene);
@@ -133,7 +138,7 @@ impl Prepared {
         memory::require(&scene, bytes as f64)?;
         let digest = digest(&plan);
         left.as_mut().map_or(Ok(()), |left| left.fit(&scene, &plan, digest))?;
-        Ok(Self { left, asked, scene, words, plan, digest, is_parted })
+        Ok(Self { left, asked, scene, words, plan, digest, is_parted: false })
     }
 
     /// A fingerprint of what all ranks must have in common: plan, scene, options, and the state to go on from.
@@ -176,7 +181,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     if let (Some(team), false) = (others, prepared.is_parted) {
         return help_to_run(prepared, common, team, begin);
     }
-    let Prepared { left, asked, scene, words, mut plan, digest, is_parted } = prepared;
+    let Prepared { left, asked, scene, words, mut plan, digest, .. } = prepared;
     let shown = arguments.publish.as_ref();
     let open = |name: &String| Positions::open(&Domain::from_environment()?, name, plan.count());
     let shown = shown.map(open).transpose()?;
@@ -245,8 +250,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     let is_interrupted = outcome.reason == StopReason::Interrupted;
     let is_small = engine.body().total() <= QUICKLY_WRITTEN;
     let mut saving = is_interrupted.then(interrupt::saving);
-    // No figures are drawn of parts.
-    let is_worth_keeping = is_interrupted || (elapsed > WORTH_KEEPING && !is_parted);
+    let is_worth_keeping = is_interrupted || engine.any_of_parts(elapsed > WORTH_KEEPING);
     if is_worth_keeping && !engine.any_of_parts(recorder.failed()) {
         let _saving = interrupt::saving();
         let kept = recorder.kept(engine);
@@ -265,10 +269,11 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
         return Err(RanksError::SaidElsewhere.into());
     }
     memory::return_what_is_free();
-    let Records { snapshots, probes, load_steps, stage, animation, writing } = records;
+    let Records { snapshots, drawn, probes, load_steps, stage, animation, writing } = records;
     let timings = Timings { setup, steps: elapsed.saturating_sub(on_the_way), output: writing };
-    let (snapshots, probes, load_steps) = (&snapshots[..], &probes[..], &load_steps[..]);
-    let results = Results { scene: &scene, outcome: &outcome, snapshots, probes, load_steps, timings };
+    let (snapshots, drawn) = (&snapshots[..], &drawn[..]);
+    let (probes, load_steps) = (&probes[..], &load_steps[..]);
+    let results = Results { scene: &scene, outcome: &outcome, snapshots, drawn, probes, load_steps, timings };
     let progress = Progress::of_drawing(quiet, "figure");
     let is_cut_short = AtomicBool::new(false);
     let show = |done: usize, of: usize| {
@@ -312,13 +317,11 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
 }
 
 impl RunArguments {
-    /// Whether each rank is to lay out a part of the body: where nothing that is asked for needs the whole.
-    fn is_parted(&self, scene: &Scene) -> bool {
-        let needs_none = !self.outputs().draws()
-            && !self.film.is_asked()
-            && !self.record.is_asked()
-            && self.publish.is_none();
-        needs_none && laid_out_whole_for(scene).is_none()
+    /// Whether each rank can lay out a part of the body: where nothing that is asked for needs the whole, unless figures of a
+    /// small one do.
+    fn may_be_parted(&self, scene: &Scene) -> bool {
+        let needs_whole = self.film.is_asked() || self.record.is_asked() || self.publish.is_some();
+        !needs_whole && laid_out_whole_for(scene).is_none()
     }
 
     fn outputs(&self) -> Outputs {

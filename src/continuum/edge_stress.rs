@@ -34,8 +34,12 @@ const OPPOSITE: f64 = -0.7;
 /// The same where the sides meet at a corner: a needle of 18 degrees is thin, a corner of 30 has an end at any spacing.
 const NEEDLE: f64 = -0.95;
 
-/// Radius of a hollow from which on the fields follow its stress \[spacings\], and a bit less.
+/// Radius of a hollow from which on the fields follow its stress \[spacings\], and a bit less; measured, it grows with the square of
+/// the material's steepness.
 const HOLLOW: f64 = 7.5;
+
+/// Steepness ([`Elastic::steepness`]) from which on a material counts as one with fibres \[1\].
+const STEEP: f64 = 1.2;
 
 /// Cells and sides of one material around a particle.
 struct Patch {
@@ -199,11 +203,11 @@ impl<'a> Patches<'a> {
         known.min_by(|&a, &b| apart(a).total_cmp(&apart(b)))
     }
 
-    /// Whether the edge at a particle is bent as by a hole of a small radius; a sharp corner, where stress has no largest
-    /// value at any spacing, is none.
-    fn is_in_hollow(&self, particle: usize, patch: &Patch) -> bool {
+    /// Whether the edge at a particle is bent as by a hole of a radius below so many spacings; a sharp corner, where stress has no
+    /// largest value at any spacing, is none.
+    fn is_in_hollow(&self, particle: usize, patch: &Patch, radius: f64) -> bool {
         let here = self.nearest_traction(patch, self.reference.get(particle));
-        here.is_some_and(|here| self.edge.hollows[here] * HOLLOW * self.spacing > 1.0)
+        here.is_some_and(|here| self.edge.hollows[here] * radius * self.spacing > 1.0)
     }
 
     /// Whether the line from a point to the middle of a cell stays in the cell's material, by the cell whose middle is
@@ -300,7 +304,7 @@ impl Balancing {
 /// of the whole.
 pub(super) fn cautions(
     edge: Option<&Edge>,
-    (body, cells): (&Body, &Cells),
+    (body, cells, elastic): (&Body, &Cells, &Elastic),
     count: impl Fn(usize) -> usize,
 ) -> Vec<String> {
     let Some(edge) = edge else {
@@ -320,7 +324,15 @@ pub(super) fn cautions(
     };
     let known = || found.iter().filter_map(|(i, patch)| Some((*i, patch.as_ref().ok()?)));
     let thin = count(known().filter(|(i, patch)| patches.is_thin(*i, patch)).count());
-    let hollow = count(known().filter(|(i, patch)| patches.is_in_hollow(*i, patch)).count());
+    let steepness = |region: u32| cells.material_of_region(region, elastic).steepness();
+    let in_hollows = |is_steep: bool| {
+        let is_one = |(i, patch): &(usize, &Patch)| {
+            let steepness = steepness(patch.region);
+            (steepness > STEEP) == is_steep && patches.is_in_hollow(*i, patch, HOLLOW * steepness * steepness)
+        };
+        count(known().filter(is_one).count())
+    };
+    let [hollow, steep] = [false, true].map(in_hollows);
     let (interface, few) = (left_out(LeftOut::Interface), left_out(LeftOut::Few));
     let mut cautions = Vec::new();
     if interface > 0 {
@@ -345,6 +357,14 @@ pub(super) fn cautions(
         cautions.push(format!(
             "stress is too low at {hollow} particles along hollows that are narrow for the spacing, holes above all; use a \
              spacing of at most an eighth of their radius, on a honeycomb a thirteenth"
+        ));
+    }
+    if steep > 0 {
+        let steepest = (0..=cells.inclusions.len() as u32).map(steepness).fold(1.0, f64::max);
+        cautions.push(format!(
+            "stress is off by a tenth or more, to either side, at {steep} particles along hollows of a material with fibres, where it \
+             changes up to {steepest:.1} times as fast as without them; use a spacing of at most a {:.0}th of their radius",
+            8.0 * steepest * steepest
         ));
     }
     cautions

@@ -244,6 +244,9 @@ fn refuse_corotated(scene: &Scene, error: &CorotatedError) -> SceneError {
         CorotatedError::Solve(error) => return refuse(scene, error),
         CorotatedError::DoubleOnly => ("equilibrium.precision", "use \"f64\", or leave the precision out"),
         CorotatedError::Feedback => ("rule.feedback", "leave it out: it does not move the place of rest"),
+        CorotatedError::Unsettled { cut_short: 1.., .. } => {
+            ("equilibrium.most_iterations", "raise it, leave it out, or take equilibrium.solver = \"direct\"")
+        }
         CorotatedError::Unsettled { .. } => (
             "equilibrium",
             "load it less, add a small load in the direction in which it may buckle, or leave [equilibrium] out to step there",

@@ -8,8 +8,8 @@ pub mod roles;
 use std::sync::Arc;
 
 use self::refusals::{
-    refuse_body, refuse_fit, refuse_outline, refuse_pieces, require_cell_neighbours, require_in_range,
-    require_resolved,
+    CORNERS, refuse_body, refuse_fit, refuse_outline, refuse_pieces, require_cell_neighbours,
+    require_in_range, require_resolved,
 };
 use crate::flock::body::{Body, BodyError, Cut, OutlineParticles};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
@@ -160,8 +160,20 @@ impl Layout {
         for k in 0..scene.inclusions.len() {
             let is_of = |cells: &Cells| (0..cells.count()).any(|cell| cells.region_of(cell) == k as u32 + 1);
             if !is_anywhere(self.cells.as_ref().is_some_and(is_of)) {
-                let message = "no cell of the lattice has its middle in it";
-                let help = "use a smaller lattice.spacing, or leave it out";
+                let shape = &scene.inclusions[k].shape;
+                let is_within = |cells: &Cells| {
+                    cells.centroids(&self.body.reference).any(|middle| shape.contains(middle, 0.0))
+                };
+                let (message, help) = match is_anywhere(self.cells.as_ref().is_some_and(is_within)) {
+                    true => (
+                        "later entries cover all of it",
+                        "list it after them, so that it counts where they overlap, or leave it out",
+                    ),
+                    false => (
+                        "no cell of the lattice has its middle in it",
+                        "use a smaller lattice.spacing, or leave it out",
+                    ),
+                };
                 return Err(scene.refuse(&format!("body.inclusions[{k}].shape"), message, help));
             }
         }
@@ -215,9 +227,7 @@ fn divided(scene: &Scene, outline: &Outline) -> Result<Partition, SceneError> {
     let shapes: Vec<_> = scene.inclusions.iter().map(|part| part.shape.clone()).collect();
     Partition::new(outline, &shapes).map_err(|error| {
         let (message, region, help) = match &error {
-            PartitionError::Outline { region, reason } => {
-                (reason.to_string(), region, "give its corners in order, once around")
-            }
+            PartitionError::Outline { region, reason } => (reason.to_string(), region, CORNERS),
             PartitionError::Outside { region } => {
                 ("it has no part of the body".to_owned(), region, "move it into the body, or leave it out")
             }

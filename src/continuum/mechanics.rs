@@ -195,8 +195,13 @@ fn highest_of_parts(engine: &Engine, own: Option<Peak>) -> Option<Peak> {
 
 /// Pairs of particles of this part that are parted at present.
 fn parted(engine: &Engine) -> Vec<[u32; 2]> {
-    let here = |index: u32| Some(engine.body().exact_particle(index as usize)? as u32);
-    engine.breaks().iter().filter_map(|one| Some([here(one.pair[0])?, here(one.pair[1])?])).collect()
+    here(engine.body(), engine.breaks().iter().map(|one| one.pair))
+}
+
+/// Those of some pairs of particles of the whole body that this part has, by their numbers here.
+pub(crate) fn here(body: &Body, pairs: impl Iterator<Item = [u32; 2]>) -> Vec<[u32; 2]> {
+    let here = |index: u32| Some(body.exact_particle(index as usize)? as u32);
+    pairs.filter_map(|[one, other]| Some([here(one)?, here(other)?])).collect()
 }
 
 /// The stress of each cell, NaN in those that are torn.
@@ -270,10 +275,12 @@ impl Mechanics {
             _ => {}
         }
         cautions.extend(self.missed_work(engine));
-        if let Some(cells) = engine.cells().filter(|_| is_material) {
-            cautions.extend(edge_stress::cautions(engine.free_edge(), (engine.body(), cells), |own| {
-                engine.count_of_parts(own)
-            }));
+        if let Some((cells, elastic)) = engine.cells().zip(engine.elastic()).filter(|_| is_material) {
+            cautions.extend(edge_stress::cautions(
+                engine.free_edge(),
+                (engine.body(), cells, elastic),
+                |own| engine.count_of_parts(own),
+            ));
         }
         cautions
     }

@@ -1,6 +1,6 @@
 //! From a scene to the arrays that an engine steps, with the checks that need the body.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
 use super::among::{Among, followed, require_loaded};
@@ -97,7 +97,14 @@ impl Plan {
     /// # Errors
     /// As [`Plan::new`], on all ranks alike.
     pub fn of_part(scene: &Scene, team: &Team) -> Result<Self, SceneError> {
-        let parting = Parting::among(scene, team)?;
+        Self::of_counted_part(scene, &Parting::among(scene, team)?, team)
+    }
+
+    /// The same where the ranks have counted the body already.
+    ///
+    /// # Errors
+    /// As [`Plan::of_part`].
+    pub fn of_counted_part(scene: &Scene, parting: &Parting, team: &Team) -> Result<Self, SceneError> {
         let layout = agreed(scene, team, parting.lay_out(scene, team.rank()))?;
         let connected = require_connected(&layout.body, &layout.neighbours, team);
         connected.map_err(|error| refuse_pieces(scene, &error))?;
@@ -507,5 +514,7 @@ fn probes(scene: &Scene, body: &Body) -> Result<Vec<usize>, SceneError> {
             scene.refuse(&format!("record.probes[{n}]"), message, "name a particle of the body")
         })
     };
-    scene.record.probes.iter().enumerate().map(probe).collect()
+    let all: Vec<usize> = scene.record.probes.iter().enumerate().map(probe).collect::<Result<_, _>>()?;
+    let mut known = HashSet::new();
+    Ok(all.into_iter().filter(|&index| known.insert(index)).collect())
 }

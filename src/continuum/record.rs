@@ -21,24 +21,27 @@ pub struct Snapshot {
     /// Role of each particle at this step.
     #[serde(with = "serde_impls::roles")]
     pub roles: Vec<Role>,
-    /// First pseudo-energy \[length^2\].
+    /// First pseudo-energy \[length^2\]; in a part of a body NaN for particles of others.
     pub pe1: Vec<f64>,
-    /// Second pseudo-energy \[length\].
+    /// Second pseudo-energy \[length\]; likewise.
     pub pe2: Vec<f64>,
-    /// Index pairs of the bonds broken so far.
+    /// Index pairs, in the whole body, of the bonds broken so far.
     pub broken: Vec<[u32; 2]>,
 }
 
 impl Snapshot {
     /// The configuration in which the engine is now.
     pub fn of(engine: &Engine) -> Self {
-        let count = engine.present().len();
+        let (count, owned) = (engine.present().len(), engine.body().owned());
+        let of = |energy: fn(&Engine, usize) -> f64| {
+            (0..count).map(|i| if owned.contains(&i) { energy(engine, i) } else { f64::NAN }).collect()
+        };
         Self {
             step: engine.step(),
             positions: engine.present().clone(),
             roles: engine.roles().to_vec(),
-            pe1: (0..count).map(|i| engine.pe1(i)).collect(),
-            pe2: (0..count).map(|i| engine.pe2(i)).collect(),
+            pe1: of(Engine::pe1),
+            pe2: of(Engine::pe2),
             broken: engine.breaks().iter().map(|b| b.pair).collect(),
         }
     }

@@ -13,6 +13,7 @@ use super::late;
 use super::layout::regions::uneven_sides;
 use super::memory::neighbour_entries;
 use super::plan::Plan;
+use crate::engine::setup::Setup;
 use crate::flock::fracture::Threshold;
 use crate::flock::law::Weights;
 use crate::flock::role::Role;
@@ -290,9 +291,9 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
     cautions.extend(late::cautions(scene));
     cautions.extend(doubts::planned(scene, &plan.setup));
     cautions.extend(cuts::planned(scene, &plan.setup.body, &plan.setup.flock.neighbours));
-    if let (Some(edge), Some(cells)) = (&plan.setup.free_edge, &plan.setup.cells) {
-        let body = &plan.setup.body;
-        cautions.extend(edge_stress::cautions(edge.of(body, cells), (body, cells), |own| own));
+    if let Setup { free_edge: Some(edge), cells: Some(cells), elastic: Some(elastic), body, .. } = &plan.setup
+    {
+        cautions.extend(edge_stress::cautions(edge.of(body, cells), (body, cells, elastic), |own| own));
     }
     let is_moved = scene.roles.iter().any(|entry| entry.motion.is_some());
     if !is_moved && plan.setup.flock.forces.is_none() {

@@ -116,8 +116,14 @@ impl PartShares {
         sweep.domain_mut().map_or((0, 0), needs)
     }
 
-    /// For the plan: names and values, with the bytes that the rank takes which takes most, with a report and without.
-    pub fn facts(&self, bytes: [usize; 2]) -> Vec<(String, String)> {
+    /// Particles of the body.
+    pub fn total(&self) -> usize {
+        self.particles.iter().sum()
+    }
+
+    /// For the plan: names and values, with the bytes that the rank takes which takes most, with a report and with tables alone,
+    /// and whether parts are drawn.
+    pub fn facts(&self, bytes: [usize; 2], are_drawn: bool) -> Vec<(String, String)> {
         let (least, most) = (self.particles.iter().min(), self.particles.iter().max());
         let (least, most) = (least.copied().unwrap_or_default(), most.copied().unwrap_or_default());
         let exchanged = match self.steps {
@@ -134,11 +140,15 @@ impl PartShares {
             0 => format!("; of others it receives {} bytes in each step", self.halo_bytes),
             steps => format!("; of others it receives {} bytes before every {steps} steps", self.halo_bytes),
         };
+        let condition = if are_drawn { "" } else { "with --figures none " };
         let parts = format!(
-            "with --figures none each rank lays out and holds its part alone, {least} to {most} particles{exchanged}"
+            "{condition}each rank lays out and holds its part alone, {least} to {most} particles{exchanged}"
         );
         let [all, tables] = bytes.map(readable_bytes);
-        let memory = format!("at most about {all} with --figures none; {tables} with --no-report as well");
+        let memory = match are_drawn {
+            true => format!("at most about {all}; {tables} with --figures none --no-report"),
+            false => format!("at most about {all} with --figures none; {tables} with --no-report as well"),
+        };
         let facts = [("parts", parts), ("memory of a part", memory)];
         facts.map(|(name, value)| (name.to_owned(), value)).into()
     }

@@ -29,6 +29,7 @@ use serde_json::Value;
 
 use self::difference::first_difference;
 pub use self::error::CheckpointError;
+use super::Drawn;
 use super::error::ExportError;
 use super::manifest::create;
 use super::parts::write_each;
@@ -44,7 +45,7 @@ use crate::scene::Scene;
 pub const FILE: &str = "checkpoint";
 pub(super) const PART: &str = "checkpoint.part";
 const MAGIC: [u8; 8] = *b"FLOCKFRM";
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 const HEADER: usize = 24;
 const PROGRAM_VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -65,6 +66,8 @@ pub struct Checkpoint<'a> {
     pub residual: f64,
     /// Configurations that are to be drawn at the end.
     pub snapshots: Cow<'a, [Snapshot]>,
+    /// Figures that are drawn already.
+    pub drawn: Cow<'a, [Drawn]>,
     /// Histories of the probed particles so far.
     pub probes: Cow<'a, [ProbeSeries]>,
     /// The response to the load so far, where it changes.
@@ -94,7 +97,8 @@ struct OtherPart {
 }
 
 /// The records of a run so far.
-type Recorded<'a> = (&'a [Snapshot], &'a [ProbeSeries], &'a [LoadStep], Option<AnimationState<'a>>);
+type Recorded<'a> =
+    (&'a [Snapshot], &'a [Drawn], &'a [ProbeSeries], &'a [LoadStep], Option<AnimationState<'a>>);
 
 /// The command line of the run, which `--resume` does not repeat.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -120,7 +124,7 @@ impl<'a> Checkpoint<'a> {
     pub fn new(
         (asked, scene, digest): (&RunRequest, &Scene, u64),
         (engine, residual): (EngineState<'a>, f64),
-        (snapshots, probes, load_steps, animation): Recorded<'a>,
+        (snapshots, drawn, probes, load_steps, animation): Recorded<'a>,
         stepping: Duration,
     ) -> Self {
         Self {
@@ -131,6 +135,7 @@ impl<'a> Checkpoint<'a> {
             engine,
             residual,
             snapshots: Cow::Borrowed(snapshots),
+            drawn: Cow::Borrowed(drawn),
             probes: Cow::Borrowed(probes),
             load_steps: Cow::Borrowed(load_steps),
             animation,

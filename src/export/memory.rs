@@ -3,7 +3,7 @@
 //! taken and given back before the plan was made, by the finite elements of a truth that leads or a setting that was chosen.
 
 use super::figures::axes::Axes;
-use super::figures::{Formats, MOST_DOTS, PNG_ZOOM, components, page, panels};
+use super::figures::{Formats, PNG_ZOOM, components, is_raster, page, panels};
 use super::report::recorder::{Packed, packed};
 use crate::continuum::memory::{measured, on_the_way, solving, stepped};
 use crate::continuum::plan::Plan;
@@ -47,18 +47,22 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
     let draws = outputs.draws();
     let before = |figure: &&usize| !is_solved_at_once && **figure < plan.stop.steps;
     let drawn_before = if draws { scene.record.figures.iter().filter(before).count() } else { 0 };
-    let [snapshots, last] = [drawn_before, usize::from(draws)].map(|each| each * SNAPSHOT * plan.count());
+    // Where bodies are so large that they are drawn as squares, configurations are drawn when their steps come.
+    let is_drawn_at_once = draws && is_raster(plan.count());
+    let kept = if is_drawn_at_once { [0; 2] } else { [drawn_before, usize::from(draws)] };
+    let [snapshots, last] = kept.map(|each| each * SNAPSHOT * plan.count());
     let Packed { values, frames, packing, text } =
         if outputs.report { packed(scene, plan) } else { Packed::default() };
+    let at_once = if is_drawn_at_once { drawing_at_once(plan) } else { 0 };
     let stepping = match is_solved_at_once {
-        true => solving(scene, plan),
-        false => values + frames[0] + taken_back(scene, plan) + solving(scene, plan),
+        true => solving(scene, plan).max(at_once),
+        false => values + frames[0] + taken_back(scene, plan) + solving(scene, plan).max(at_once),
     };
     let packing = last + values.max(packing) + frames[1];
     let tables = last + text + measured(plan);
-    // Of stresses a figure needs those of the cells, and what it shows of them; there are two that do.
-    let cells = plan.setup.cells.as_ref().map_or(0, Cells::count);
-    let stresses = rayon::current_num_threads().min(2) * (size_of::<StressState>() + SHOWN) * cells;
+    // There are two figures of stresses.
+    let at_once = if is_drawn_at_once { 0 } else { rayon::current_num_threads().min(2) };
+    let stresses = at_once * stresses(plan);
     let drawing = match draws {
         true => last + text + pictures(scene, plan, drawn_before + 1) + stresses,
         false => 0,
@@ -72,14 +76,25 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
     program + RUNNING + stepped(plan) + snapshots + most
 }
 
+/// Bytes of what a figure needs of stresses: those of the cells, and what it shows of them.
+fn stresses(plan: &Plan) -> usize {
+    (size_of::<StressState>() + SHOWN) * plan.setup.cells.as_ref().map_or(0, Cells::count)
+}
+
+/// Bytes of a configuration that is drawn when its step comes; figures of stresses need displacements and places as well.
+fn drawing_at_once(plan: &Plan) -> usize {
+    let shown = if plan.setup.cells.is_some() { 2 * 16 } else { 0 };
+    (SNAPSHOT + shown) * plan.count() + stresses(plan)
+}
+
 /// Bytes of the places to which a body is taken back whose step diverges, or whose steps at once came to rest on the way.
 fn taken_back(scene: &Scene, plan: &Plan) -> usize {
     if scene.is_solved_at_once() { 0 } else { 16 * plan.count() }
 }
 
-/// Bytes that one of so many ranks with a part of a body takes at its largest, by a program whose own code takes so many: there
-/// are no figures, and tables are written row by row. The first rank keeps what a `report` shows.
-pub fn of_part(scene: &Scene, plan: &Plan, (ranks, report): (usize, bool), program: usize) -> usize {
+/// Bytes that one of so many ranks with a part of a body takes at its largest, by a program whose own code takes so many: tables
+/// are written row by row. The first rank keeps what a report shows, and turns figures into pixels.
+pub fn of_part(scene: &Scene, plan: &Plan, (ranks, outputs): (usize, Outputs), program: usize) -> usize {
     /// Memory of MPI, and what it shares with each rank on a machine; measured with Open MPI 4.1.
     const MPI: [usize; 2] = [4 << 20, 3 << 19];
     /// Ranks that share a machine's memory, as far as it is known beforehand.
@@ -88,10 +103,15 @@ pub fn of_part(scene: &Scene, plan: &Plan, (ranks, report): (usize, bool), progr
     const ON_THE_WAY: usize = 2 * 2 * 16;
     let [each, of_rank] = MPI;
     let halo = plan.setup.body.part.as_ref().map_or(0, |part| part.exact.len() - part.owned.len());
-    let Packed { values, frames, packing, .. } = if report { packed(scene, plan) } else { Packed::default() };
+    let Packed { values, frames, packing, .. } =
+        if outputs.report { packed(scene, plan) } else { Packed::default() };
     let stepping = ON_THE_WAY * halo + taken_back(scene, plan);
-    let most = measured(plan).max(stepping).max(solving(scene, plan));
-    let shown = values.max(packing) + frames[0];
+    let [at_once, drawing] = match outputs.draws() {
+        true => [drawing_at_once(plan), pictures(scene, plan, scene.record.figures.len() + 1)],
+        false => [0; 2],
+    };
+    let most = measured(plan).max(stepping).max(solving(scene, plan)).max(at_once);
+    let shown = values.max(packing).max(drawing) + frames[0];
     program
         + RUNNING
         + stepped(plan)
@@ -120,13 +140,18 @@ fn pictures(scene: &Scene, plan: &Plan, moments: usize) -> usize {
     let bytes = |[width, height]: [f64; 2]| 4 * (f64::from(PNG_ZOOM).powi(2) * width * height) as usize;
     let body = &plan.setup.body;
     // As it lies before it is deformed.
-    let axes = page::window(&body.reference, 0..plan.count(), body.lattice.spacing());
+    let (low, high) = match &body.part {
+        Some(_) => body.bounds(),
+        None => body.reference.bounds(0..plan.count()).unwrap_or_default(),
+    };
+    let (bounds, spacing) = (Some([low, high]), body.lattice.spacing());
+    let axes = page::around(bounds, spacing);
     let sheet = bytes([page::width_of(&axes, BAR), ABOVE + axes.size[1] + Axes::BELOW]);
     let has_cells = plan.setup.cells.is_some();
     let of_each = if has_cells { 3 } else { 2 };
     let mut sheets = vec![sheet; of_each * moments];
     if has_cells {
-        let (axes, is_row) = components::window(&body.reference, 0..plan.count(), body.lattice.spacing());
+        let (axes, is_row) = components::window(bounds, spacing);
         sheets.extend(vec![bytes(panels::sheet_size(&axes, is_row, [BAR, ABOVE])); moments]);
     }
     let charts = [
@@ -139,7 +164,7 @@ fn pictures(scene: &Scene, plan: &Plan, moments: usize) -> usize {
     let at_once = rayon::current_num_threads();
     // Of a lattice contours are drawn of energies, of points each as a dot as well.
     let of_dots = if body.numbering.is_some() { of_each * moments } else { moments };
-    let dots = if plan.count() <= MOST_DOTS { DOT * plan.count() * at_once.min(of_dots) } else { 0 };
+    let dots = if is_raster(body.total()) { 0 } else { DOT * plan.count() * at_once.min(of_dots) };
     let dashes = if plan.setup.flock.bonds.is_some() { DASHES } else { 0 };
     PAINTER + dots + dashes + sheets.iter().take(at_once).map(|one| one + FONTS).sum::<usize>()
 }

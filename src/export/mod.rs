@@ -47,8 +47,8 @@
 //! });
 //! frames.finish()?;
 //! let timings = Timings::default();
-//! let (probes, load_steps) = (&[], &[]);
-//! let results = Results { scene: &scene, outcome: &outcome, snapshots: &snapshots, probes, load_steps, timings };
+//! let (scene, outcome, snapshots) = (&scene, &outcome, &snapshots[..]);
+//! let results = Results { scene, outcome, snapshots, drawn: &[], probes: &[], load_steps: &[], timings };
 //! write_all(&folder, &results, Drawing::default())?;
 //! println!("written to {}", folder.commit()?.display());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -88,10 +88,9 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 use rayon::prelude::*;
-#[cfg(any(feature = "bench", feature = "fem"))]
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use crate::continuum::mechanics::Stresses;
+use crate::continuum::mechanics::{Stresses, here};
 use crate::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use crate::continuum::run::Outcome;
 use crate::engine::Engine;
@@ -115,12 +114,39 @@ pub struct Results<'a> {
     pub outcome: &'a Outcome,
     /// The configurations to draw.
     pub snapshots: &'a [Snapshot],
+    /// Those that are drawn already ([`Drawn::of`]).
+    pub drawn: &'a [Drawn],
     /// Histories of the probed particles.
     pub probes: &'a [ProbeSeries],
     /// The work of a changing load, where the scene has one.
     pub load_steps: &'a [LoadStep],
     /// Times of the parts of the run so far.
     pub timings: Timings,
+}
+
+/// A figure that was drawn when its step came: of a body so large that it is drawn as squares, whose configuration would take
+/// far more memory, and of which each rank may have a part.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Drawn {
+    /// Steps or increments taken.
+    pub step: usize,
+    /// Its file without ending.
+    pub name: String,
+    /// The drawing; empty on ranks other than the first.
+    pub svg: String,
+}
+
+impl Drawn {
+    /// The figures of the engine's present configuration, drawn by all ranks together where each has a part of the body, which
+    /// has to be one that is drawn as squares ([`figures::is_raster`]).
+    pub fn of(scene: &Scene, engine: &Engine) -> Vec<Self> {
+        let (snapshot, subject, units) = (Snapshot::of(engine), Subject::of(scene, engine), Units::of(scene));
+        let figures = figures_of_snapshot((scene, engine), &subject, &units, &snapshot);
+        let is_first = engine.parted().is_none_or(Team::is_first);
+        let kept = |svg| if is_first { svg } else { String::new() };
+        let figures = figures.into_iter();
+        figures.map(|(name, draw)| Self { step: snapshot.step, name, svg: kept(draw()) }).collect()
+    }
 }
 
 /// Options for drawing figures.
@@ -268,31 +294,47 @@ fn draw_all(
     Ok(written?.concat())
 }
 
+/// The figures of a configuration. Stresses are found while each of those that show them is drawn, and are there neither before
+/// nor after.
+fn figures_of_snapshot<'a>(
+    (scene, engine): (&'a Scene, &'a Engine),
+    subject: &'a Subject<'_>,
+    units: &'a Units,
+    snapshot: &'a Snapshot,
+) -> Vec<Figure<'a>> {
+    let name = |what: &str| format!("{what}_{:04}", snapshot.step);
+    let mut figures: Vec<Figure<'a>> = vec![
+        (name("configuration"), Box::new(move || figures::configuration(subject, snapshot))),
+        (name("pe1"), Box::new(move || figures::pe1(subject, snapshot))),
+    ];
+    let Some(cells) = engine.cells() else { return figures };
+    let parted = move || here(engine.body(), snapshot.broken.iter().copied());
+    let displacement = move || figures::displacement(subject, snapshot);
+    let unit = units.stress.as_str();
+    let in_cells = move || Stresses::in_cells(engine, snapshot.step, &displacement(), &parted());
+    let von_mises = move || {
+        // Squares show no edges, along which stress is known at the particles.
+        let found = match figures::is_raster(engine.body().total()) {
+            false => Stresses::of(engine, snapshot.step, &displacement(), &parted()),
+            true => None,
+        };
+        let of_cells = || Stresses { cells: in_cells(), particles: Vec::new(), recovered: Vec::new() };
+        figures::stress(subject, snapshot, cells, &found.unwrap_or_else(of_cells), unit)
+    };
+    let components =
+        move || figures::components(subject, snapshot, (cells, scene.rotation()), &in_cells(), unit);
+    figures.push((name("von_mises"), Box::new(von_mises)));
+    figures.push((name("stress"), Box::new(components)));
+    figures
+}
+
 fn figures_of<'a>(results: &'a Results<'_>, subject: &'a Subject<'_>, units: &'a Units) -> Vec<Figure<'a>> {
-    let Results { scene, outcome, snapshots, probes, load_steps, .. } = *results;
-    let mut figures: Vec<Figure<'a>> = Vec::new();
-    for snapshot in snapshots {
-        let name = |what: &str| format!("{what}_{:04}", snapshot.step);
-        figures.push((name("configuration"), Box::new(move || figures::configuration(subject, snapshot))));
-        figures.push((name("pe1"), Box::new(move || figures::pe1(subject, snapshot))));
-        if let Some(cells) = outcome.engine.cells() {
-            // Each figure has stresses of its own while it is drawn, and none before or after.
-            let displacement = move || figures::displacement(subject, snapshot);
-            let unit = units.stress.as_str();
-            let von_mises = move || {
-                let found = Stresses::of(&outcome.engine, snapshot.step, &displacement(), &snapshot.broken);
-                let none = || Stresses { cells: Vec::new(), particles: Vec::new(), recovered: Vec::new() };
-                figures::stress(subject, snapshot, cells, &found.unwrap_or_else(none), unit)
-            };
-            let components = move || {
-                let stresses =
-                    Stresses::in_cells(&outcome.engine, snapshot.step, &displacement(), &snapshot.broken);
-                figures::components(subject, snapshot, (cells, scene.rotation()), &stresses, unit)
-            };
-            figures.push((name("von_mises"), Box::new(von_mises)));
-            figures.push((name("stress"), Box::new(components)));
-        }
-    }
+    let Results { scene, outcome, snapshots, drawn, probes, load_steps, .. } = *results;
+    let already = |one: &'a Drawn| -> Figure<'a> { (one.name.clone(), Box::new(|| one.svg.clone())) };
+    let to_draw = snapshots
+        .iter()
+        .flat_map(|snapshot| figures_of_snapshot((scene, &outcome.engine), subject, units, snapshot));
+    let mut figures: Vec<Figure<'a>> = drawn.iter().map(already).chain(to_draw).collect();
     if !probes.is_empty() {
         figures.push(("probes".into(), Box::new(move || figures::probes(subject, probes))));
     }

@@ -63,8 +63,8 @@ fn of_pairs(own: ([f64; 2], [f64; 2]), pairs: impl Iterator<Item = ([f64; 2], [f
     }
     let [xx, yy, xy] = then_then;
     let determinant = xx * yy - xy * xy;
-    // Neighbours on a line leave one direction unknown.
-    if determinant.is_nan() || determinant <= 1e-9 * xx.max(yy) * xx.max(yy) {
+    // Neighbours on a line leave one direction unknown, also where rounding has moved them off it.
+    if determinant.is_nan() || determinant <= 1e-9 * xx * yy || xx.min(yy) <= 1e-18 * xx.max(yy) {
         return None;
     }
     let inverse = [[yy / determinant, -xy / determinant], [-xy / determinant, xx / determinant]];
@@ -133,9 +133,24 @@ mod tests {
     }
 
     #[test]
+    fn neighbours_may_be_far_farther_along_one_axis_than_along_the_other() {
+        for apart in [1e5, 1e-6] {
+            let around = [[apart, 0.0], [-apart, 0.0], [0.0, 1.0]];
+            let pairs = around.map(|[x, y]| ([x, y], [1.1 * x + 0.2 * y, 0.8 * y]));
+            let found = of_pairs(([0.0; 2], [0.0; 2]), pairs.into_iter()).expect("spanned");
+            let [c, s] = [found.rotation.cos(), found.rotation.sin()];
+            assert!((found.components[0] - (1.1 * c - 1.0)).abs() < 1e-12, "{found:?}");
+            assert!((found.rotation - f64::atan2(-0.2, 1.9)).abs() < 1e-12 && s < 0.0, "{found:?}");
+        }
+    }
+
+    #[test]
     fn neighbours_on_a_line_say_nothing() {
         let line = [[1.0, 1.0], [3.0, 3.0]].map(|at| (at, at));
         assert_eq!(of_pairs(([2.0, 2.0], [2.0, 2.0]), line.into_iter()), None);
         assert_eq!(of_pairs(([2.0, 2.0], [2.0, 2.0]), std::iter::empty()), None);
+        // Of rounding no direction can be known.
+        let level = [[1.0, 0.3], [3.0, 0.1 + 0.2]].map(|at| (at, at));
+        assert_eq!(of_pairs(([2.0, 0.3], [2.0, 0.3]), level.into_iter()), None);
     }
 }

@@ -4,11 +4,11 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use tungstenite::{Bytes, Utf8Bytes};
+use tungstenite::{Bytes, Message, Utf8Bytes};
 
 use super::session::{Broken, Viewer};
 
-/// Words that wait for a viewer; older ones are dropped.
+/// Messages that wait for a viewer; older ones are dropped.
 const MOST_NOTICES: usize = 32;
 
 /// The state at a moment, encoded once for all viewers.
@@ -41,7 +41,7 @@ pub struct Board {
 struct Inner {
     now: Published,
     page: Arc<str>,
-    viewers: BTreeMap<Viewer, VecDeque<Utf8Bytes>>,
+    viewers: BTreeMap<Viewer, VecDeque<Message>>,
     /// Quantities that viewers look at.
     wanted: BTreeMap<Viewer, String>,
     is_closed: bool,
@@ -50,8 +50,8 @@ struct Inner {
 /// Something new for a viewer.
 #[derive(Debug)]
 pub enum News {
-    /// Words for this viewer.
-    Notice(Utf8Bytes),
+    /// A message for this viewer.
+    Notice(Message),
     /// A later state than the one it has.
     State(Published),
     /// Nothing in the time that was waited.
@@ -118,11 +118,16 @@ impl Board {
 
     /// Says something to a viewer.
     pub fn send(&self, viewer: Viewer, words: &serde_json::Value) {
+        self.post(viewer, Message::text(words.to_string()));
+    }
+
+    /// Sends a message to a viewer alone.
+    pub(super) fn post(&self, viewer: Viewer, message: Message) {
         if let Some(notices) = self.inner().viewers.get_mut(&viewer) {
             if notices.len() >= MOST_NOTICES {
                 notices.pop_front();
             }
-            notices.push_back(words.to_string().into());
+            notices.push_back(message);
         }
         self.changed.notify_all();
     }

@@ -88,7 +88,11 @@ fn receive(
     loop {
         let text = match socket.read() {
             Ok(Message::Text(text)) => text,
-            Ok(Message::Ping(_) | Message::Pong(_)) => continue,
+            Ok(Message::Ping(payload)) => {
+                board.post(viewer, Message::Pong(payload));
+                continue;
+            }
+            Ok(Message::Pong(_)) => continue,
             Ok(_) | Err(_) => return,
         };
         match Command::parse(&text) {
@@ -124,7 +128,7 @@ fn send(stream: &TcpStream, viewer: Viewer, board: &Board, undrawn: &AtomicU32) 
         let is_ready = || undrawn.load(Ordering::Relaxed) < MOST_UNDRAWN;
         match board.wait(viewer, sent.number, is_ready, IDLE) {
             News::Closed => return socket.close(None),
-            News::Notice(words) => socket.send(Message::Text(words))?,
+            News::Notice(message) => socket.send(message)?,
             News::Nothing if !is_ready() => undrawn.store(MOST_UNDRAWN - 1, Ordering::Relaxed),
             News::Nothing => socket.send(Message::Ping(tungstenite::Bytes::new()))?,
             News::State(now) => {

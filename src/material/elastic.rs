@@ -144,6 +144,21 @@ impl Elastic {
         &self.stiffness
     }
 
+    /// How fast stress falls off beside the crown of a hole in a sheet that is pulled along its fibres or across them, whichever is
+    /// faster, over how fast it does so in an isotropic one \[1\]; by the polynomial of H. J. Konish and J. M. Whitney, *Approximate
+    /// stresses in an orthotropic plate containing a circular hole*, J. Composite Materials 9, 1975.
+    pub fn steepness(&self) -> f64 {
+        let Constants::Orthotropic { young: [along, across], poisson_12, shear, .. } = self.constants else {
+            return 1.0;
+        };
+        let peak = |one: f64, other: f64, poisson: f64| {
+            1.0 + (2.0 * ((one / other).sqrt() - poisson) + one / shear).max(0.0).sqrt()
+        };
+        let highest = peak(along, across, poisson_12).max(peak(across, along, poisson_12 * across / along));
+        let slope = |peak: f64| (7.0 + 13.0 * (peak - 3.0)) / peak;
+        (slope(highest) / slope(3.0)).max(1.0)
+    }
+
     /// Stiffness against a dilatation averaged over the cells around a particle, instead of that of each cell: Lame's
     /// lambda times the thickness \[force / length\]. `None` where each cell resists its own.
     ///
@@ -280,6 +295,19 @@ mod tests {
 
     fn fibres(poisson_12: f64, angle: f64) -> Result<Elastic, ElasticError> {
         Elastic::new(Constants::Orthotropic { young: [9.0, 1.0], poisson_12, shear: 0.7, angle }, 1.0)
+    }
+
+    #[test]
+    fn stress_beside_a_hole_is_as_steep_as_the_fibres_make_it() {
+        let sheet = |young: [f64; 2], poisson_12: f64, shear: f64| {
+            let constants = Constants::Orthotropic { young, poisson_12, shear, angle: 0.4 };
+            Elastic::new(constants, 1.0).expect("stable").steepness()
+        };
+        // Equal constants are those of an isotropic sheet.
+        assert!((sheet([130.0, 130.0], 0.3, 50.0) - 1.0).abs() < 1e-12);
+        // S. G. Lekhnitskii's stress at the crown is 6.543 times the pull: (7 + 13 * 3.543) / 6.543 over 7 / 3.
+        assert!((sheet([200.0, 20.0], 0.3, 8.0) - 3.475).abs() < 1e-3);
+        assert_eq!(sheet([20.0, 200.0], 0.03, 8.0), sheet([200.0, 20.0], 0.3, 8.0));
     }
 
     #[test]

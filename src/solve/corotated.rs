@@ -72,14 +72,18 @@ pub enum CorotatedError {
     DoubleOnly,
     /// Increments of the way got too small, or there were too many.
     #[error(
-        "the rotations do not settle beyond {:.1} % of the way of leaders and loads ({solves} systems solved): the body snaps, buckles or is torn there",
-        100.0 * part
+        "the rotations do not settle beyond {:.1} % of the way of leaders and loads ({solves} systems solved{}): the body snaps, buckles or is torn there{}",
+        100.0 * part,
+        if *cut_short > 0 { format!(", {cut_short} of them no further than most_iterations allows") } else { String::new() },
+        if *cut_short > 0 { ", or was never brought to rest" } else { "" }
     )]
     Unsettled {
         /// Share of the way of leaders and loads that was reached \[1\].
         part: f64,
         /// Systems that were solved.
         solves: usize,
+        /// Those of which the iterations that were asked for came to no end.
+        cut_short: usize,
     },
 }
 
@@ -196,6 +200,7 @@ pub fn solve_in_parts(
         residuals: vec![1.0],
         times: [Duration::ZERO; 2],
         last_step: f64::INFINITY,
+        cut_short: 0,
     };
     let displacement = if newton.size == 0.0 { (way.held)(way.end) } else { newton.go(tolerance)? };
     let residuals = if newton.size == 0.0 { vec![0.0] } else { newton.residuals };
@@ -441,6 +446,8 @@ struct Newton<'a> {
     times: [Duration; 2],
     /// Size of the last step over that of the displacements \[1\].
     last_step: f64,
+    /// Systems of steps of which the iterations that were asked for came to no end.
+    cut_short: usize,
 }
 
 impl Newton<'_> {
@@ -465,7 +472,8 @@ impl Newton<'_> {
             }
             let solves = self.residuals.len() - 1;
             if done < 1.0 && (stride < LEAST_STRIDE || solves >= MOST_SOLVES) {
-                return Err(CorotatedError::Unsettled { part: way.part(done), solves });
+                let (part, cut_short) = (way.part(done), self.cut_short);
+                return Err(CorotatedError::Unsettled { part, solves, cut_short });
             }
         }
         Ok(u)
@@ -536,6 +544,8 @@ impl Newton<'_> {
     ) -> Result<(), CorotatedError> {
         let rule = self.rule;
         let solved = self.solved(locals, [left, led], &rule.step)?;
+        let is_spent = solved.residuals.len() > rule.step.most_iterations;
+        self.cut_short += usize::from(is_spent && !solved.converged);
         self.last_step = rule.norm(&solved.displacement) / rule.norm(u).max(f64::MIN_POSITIVE);
         for (i, by) in solved.displacement.iter().enumerate() {
             let at = u.get(i);

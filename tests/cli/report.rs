@@ -85,5 +85,7 @@ fn a_gallery_leads_to_the_reports_of_what_is_named() {
 fn a_gallery_of_what_is_not_bundled_is_refused_with_exit_code_2_and_leaves_nothing() {
     let folder = temporary();
     refused_in(&["gallery", "tensoin", "--out", "out"], folder.path(), &["`tension`"]);
+    std::fs::write(folder.path().join("mine.toml"), "").expect("written");
+    refused_in(&["gallery", "mine.toml", "--out", "out"], folder.path(), &["no file is taken here"]);
     assert!(!folder.path().join("out").exists());
 }

@@ -514,6 +514,9 @@ fn the_schema_is_json_and_knows_every_top_level_key() {
     {
         assert!(schema["properties"][key].is_object(), "{key}");
     }
+    // Particles are counted from 1.
+    let probes = &schema["$defs"]["RawRecord"]["properties"]["probes"];
+    assert_eq!(probes["items"]["minimum"], 1, "{probes}");
 }
 
 #[test]

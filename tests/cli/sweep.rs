@@ -29,12 +29,15 @@ fn a_sweep_has_the_numbers_of_single_runs() {
     let varied: Vec<String> = rows[1..].iter().map(|row| row[1..3].join(" ")).collect();
     assert_eq!(varied, ["0.5 20", "0.5 40", "0.75 20", "0.75 40", "1 20", "1 40"]);
     let set = ["--set", "update.damping=0.75", "--set", "stop.steps=40"];
+    // Probed twice, kept once.
+    let twice = ["--set", "record.probes=[67,67,1]"];
     let run = ["run", "tension", "-q", "--figures", "none", "--no-report", "--out", "single"];
-    done(&[&run[..], &set].concat(), folder.path());
+    done(&[&run[..], &set, &twice].concat(), folder.path());
     let (summary, single) = (read(folder.path().join("single/summary.json")), &rows[4]);
     assert!(summary.contains(&format!("\"pe1\": {},", single[3])), "{single:?} {summary}");
     assert_eq!((single[4].as_str(), single[7].as_str()), ("40", "steps"));
     let probes = table(folder.path().join("single/probes.csv"));
+    assert_eq!(probes.iter().filter(|row| row[0] == "20").count(), 2);
     let place = |step: &str| -> f64 {
         let row = probes.iter().find(|row| row[0] == step && row[1] == "67").expect("probed");
         row[2].parse().expect("a number")

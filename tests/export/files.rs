@@ -60,6 +60,7 @@ impl Run {
             scene: &self.scene,
             outcome: &self.outcome,
             snapshots: &self.snapshots,
+            drawn: &[],
             probes: &self.probes,
             load_steps: &[],
             timings: Timings::default(),

@@ -34,7 +34,7 @@ fn good(folder: &Path) -> Vec<u8> {
     }
     let asked = RunRequest { scene: "tension".into(), set: Vec::new(), force: false };
     let (snapshots, probes) = ([Snapshot::of(&engine)], [probe]);
-    let kept = (&snapshots[..], &probes[..], &[][..], None);
+    let kept = (&snapshots[..], &[][..], &probes[..], &[][..], None);
     let state = (EngineState::of(&engine), 0.5);
     Checkpoint::new((&asked, &scene, sum), state, kept, Duration::ZERO).write(folder).expect("written");
     std::fs::read(folder.join(checkpoint::FILE)).expect("there")

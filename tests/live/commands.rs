@@ -42,5 +42,6 @@ fn the_page_shows_the_command_with_what_was_set() {
         viewer.status("the command with a key", |status| status["command"] == all);
         viewer.ask(&json!({ "do": "undo" }));
         viewer.status("the command without it", |status| status["command"] == typed);
+        assert!(viewer.pings(b"still there?"));
     }
 }

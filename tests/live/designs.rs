@@ -45,6 +45,7 @@ fn robots_given_one_by_one_fly_as_the_lattice_does_that_they_come_from() {
     for (name, set) in [
         ("square", &["flight.duration=12.0"][..]),
         ("square", &["flight.duration=6.0", "rule={}", "limits.clearance=0.1"]),
+        ("square", &["flight.duration=6.0", "rule={mean={kind=\"distance\"}}", "control.sweeps=3"]),
         ("faulty-robot", &["flight.duration=3.0"]),
     ] {
         let mut live = begun(name, set);

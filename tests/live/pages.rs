@@ -60,6 +60,19 @@ impl Viewer {
         within(PATIENCE, "a viewer is let in", || Self::enter(&host, &token))
     }
 
+    /// Whether a ping is answered, as clients that watch over a connection expect.
+    pub fn pings(&mut self, payload: &'static [u8]) -> bool {
+        self.socket.send(Message::Ping(payload.into())).expect("sent");
+        let since = Instant::now();
+        while since.elapsed() < PATIENCE {
+            match self.socket.read().expect("open") {
+                Message::Pong(answer) => return answer == payload,
+                _ => continue,
+            }
+        }
+        false
+    }
+
     pub fn ask(&mut self, command: &Value) {
         self.socket.send(Message::text(command.to_string())).expect("sent");
     }

@@ -22,6 +22,7 @@ use scenes::{load, planned};
 
 mod averaged;
 mod changed;
+mod drawn;
 mod increments;
 mod parts;
 mod rest;

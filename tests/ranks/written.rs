@@ -56,7 +56,7 @@ impl Writer<'_> {
     fn leave(&self, engine: &Engine, residual: f64) {
         let asked = RunRequest { scene: "plate".into(), set: Vec::new(), force: false };
         let state = (EngineState::of(engine), residual);
-        let recorded = (&[][..], &[][..], &self.rows[..], None);
+        let recorded = (&[][..], &[][..], &[][..], &self.rows[..], None);
         let mut left =
             Checkpoint::new((&asked, self.scene, self.digest), state, recorded, Duration::default());
         if let Some(team) = self.team {
@@ -114,7 +114,8 @@ fn write(scene: &Scene, team: Option<&Team>, out: &Path, from: Option<&Path>, le
     }
     let load_steps = &writer.rows[..];
     let timings = Timings::default();
-    let results = Results { scene, outcome: &outcome, snapshots: &[], probes: &[], load_steps, timings };
+    let (outcome, snapshots, drawn, probes) = (&outcome, &[], &[], &[]);
+    let results = Results { scene, outcome, snapshots, drawn, probes, load_steps, timings };
     let drawing = Drawing { formats: Formats::None, ..Drawing::default() };
     write_all(folder_of, &results, drawing).expect("written");
     if let Some(frames) = writer.frames {

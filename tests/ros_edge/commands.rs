@@ -58,6 +58,15 @@ fn limits_are_tightened_and_never_loosened() {
 }
 
 #[test]
+fn a_clearance_where_robots_are_not_kept_apart_is_refused() {
+    let mut peers = peers();
+    let apart_from_nothing = [&PATIENT[..], &["limits={speed=1.0}"]].concat();
+    let mut swarm = Swarming::open(&square(&apart_from_nothing), &[]);
+    let refused = set(&mut peers, &mut swarm, "clearance", 0.5).expect_err("without effect");
+    assert!(refused.contains("limits.clearance"), "{refused}");
+}
+
+#[test]
 fn the_gains_of_the_rule_change_while_it_flies() {
     let mut peers = peers();
     let mut swarm = Swarming::open(&square(&PATIENT), &[]);

@@ -4,6 +4,7 @@ use flockform::flock::vectors::distance;
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::control::Control;
 use flockform::swarm::control::scope::NodeScope;
+use flockform::swarm::robots::{DoubleIntegrator, Model, Robot};
 use flockform::swarm::watch::Pose;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -215,4 +216,101 @@ fn a_robot_that_was_carried_away_is_led_from_where_it_is() {
         places[0] = target;
     }
     assert!(places[0][0] < 1.0, "it went on: {places:?}");
+}
+
+/// The place that a robot reached with the last pose, and left, is none where it may still be.
+#[test]
+fn robots_keep_clear_when_poses_become_late_on_the_way() {
+    let mut met = f64::INFINITY;
+    for seed in 0..60 {
+        let mut random = Pcg64Mcg::seed_from_u64(seed);
+        let mut control = Control::new(&circle("integrator\"")).expect("laid out");
+        let mut poses = vec![control.formation().places.clone()];
+        let mut heard = -1;
+        for tick in 0..160 {
+            if tick % 20 == 0 {
+                for k in 0..ROBOTS {
+                    let goal = [0, 1].map(|_| random.random_range(-1.5..1.5));
+                    assert!(control.place_leader(k, goal));
+                }
+            }
+            let late = [0, 2, 0, 1, 3][(tick / 5 + seed as usize) % 5];
+            let old = tick as i64 - late;
+            if old > heard {
+                heard = old;
+                let (stamp, now) = (old as f64 * PERIOD, tick as f64 * PERIOD);
+                for k in 0..ROBOTS {
+                    let position = poses[old as usize].get(k);
+                    let pose = Pose { position, yaw: 0.0, stamp, frame_is_right: true };
+                    control.receive(k, pose, now).expect("a pose");
+                }
+            }
+            control.tick(tick as f64 * PERIOD);
+            let mut next = poses[tick].clone();
+            (0..ROBOTS).for_each(|k| next.set(k, control.target(k).unwrap_or(next.get(k))));
+            for (a, b) in (0..ROBOTS).flat_map(|a| (0..a).map(move |b| (a, b))) {
+                let gap = distance(next.get(a), next.get(b)) - 0.3;
+                assert!(gap >= 0.1 - 1e-9, "seed {seed}, tick {tick}: r{a} and r{b} {gap} m apart");
+                met = met.min(gap);
+            }
+            poses.push(next);
+        }
+    }
+    assert!(met < 0.101, "they met: {met}");
+}
+
+/// The place of a late pose, or that of a robot that has yet to brake, lies behind it.
+#[test]
+fn robots_come_to_rest_in_an_emergency_stop_and_do_not_go_back() {
+    let acceleration = 0.5;
+    let limited = [format!("limits.acceleration={acceleration}")];
+    for (model, sets, late) in [
+        ("integrator", &[][..], 0),
+        ("integrator", &[], 4),
+        ("integrator", &limited, 0),
+        ("integrator", &limited, 4),
+        ("double-integrator", &limited, 0),
+        ("double-integrator", &limited, 4),
+    ] {
+        let mut control = Control::new(&circle_with(&format!("{model}\""), sets)).expect("laid out");
+        assert!(control.place_leader(0, [40.0, 0.0]));
+        let dynamics = Model::DoubleIntegrator(DoubleIntegrator { speed: 1.0, acceleration });
+        let mut robot = Robot::at(control.formation().places.get(0), 0.0);
+        let mut poses = vec![robot.position];
+        let (mut stopped_at, mut farthest) = (f64::NAN, f64::NEG_INFINITY);
+        for tick in 0..200 {
+            let now = tick as f64 * PERIOD;
+            if let Some(old) = (tick as usize).checked_sub(late) {
+                let stamp = old as f64 * PERIOD;
+                let pose = Pose { position: poses[old], yaw: 0.0, stamp, frame_is_right: true };
+                control.receive(0, pose, now).expect("a pose");
+                for k in 1..ROBOTS {
+                    let position = control.formation().places.get(k);
+                    control.receive(k, Pose { position, ..pose }, now).expect("a pose");
+                }
+            }
+            if tick == 80 {
+                stopped_at = robot.position[0];
+                control.emergency_stop();
+            }
+            control.tick(now);
+            let target = control.target(0).unwrap_or(robot.position);
+            match model {
+                "integrator" => robot.position = target,
+                _ => robot.step(&dynamics, target, PERIOD),
+            }
+            if tick >= 80 {
+                let back = farthest - robot.position[0];
+                assert!(back < 0.01, "{model} {sets:?}, {late} late: {back} m back in tick {tick}");
+                farthest = farthest.max(robot.position[0]);
+            }
+            poses.push(robot.position);
+        }
+        let (way, rest) = (farthest - stopped_at, distance(poses[199], poses[200]));
+        let most = if sets.is_empty() { 1e-9 } else { 1.0 / (2.0 * acceleration) + 2.0 * PERIOD };
+        assert!(
+            stopped_at > 5.0 && way <= most && rest < 1e-6,
+            "{model} {sets:?}, {late} late: {way} m, {rest} m"
+        );
+    }
 }

@@ -1,5 +1,5 @@
 //! The records of a run: snapshots, probes, measurements, frames, and what its report shows. Where each rank has a part of the
-//! body there are no snapshots, and the first rank has the probes of all, and what the report shows.
+//! body the first rank has the figures and the probes of all, and what the report shows.
 
 use std::time::{Duration, Instant};
 
@@ -7,10 +7,11 @@ use flockform::continuum::plan::Plan;
 use flockform::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use flockform::continuum::run::Outcome;
 use flockform::engine::Engine;
+use flockform::export::figures::is_raster;
 use flockform::export::memory::Outputs;
 use flockform::export::report::view::View;
 use flockform::export::report::{AnimationState, RunRecorder};
-use flockform::export::{ExportError, OutputFolder, VtkSeries, probes_of_parts, write_piece};
+use flockform::export::{Drawn, ExportError, OutputFolder, VtkSeries, probes_of_parts, write_piece};
 use flockform::ranks::Team;
 use flockform::scene::{LoadSteps, Scene};
 
@@ -20,6 +21,8 @@ use crate::cli::checkpoint::{Recorded, ResumedRun};
 pub struct Recorder<'a> {
     scene: &'a Scene,
     snapshots: Vec<Snapshot>,
+    /// Figures of bodies of which no snapshots are kept.
+    drawn: Vec<Drawn>,
     probes: Vec<ProbeSeries>,
     /// Indices of the probed particles in the whole body.
     probed: Vec<usize>,
@@ -40,6 +43,7 @@ pub struct Recorder<'a> {
 /// The records of a run, and the time spent writing them.
 pub struct Records {
     pub snapshots: Vec<Snapshot>,
+    pub drawn: Vec<Drawn>,
     pub probes: Vec<ProbeSeries>,
     pub load_steps: Vec<LoadStep>,
     /// The view of the report.
@@ -70,6 +74,7 @@ impl<'a> Recorder<'a> {
         Ok(Self {
             scene,
             snapshots: left.map_or_else(Vec::new, |left| left.checkpoint.snapshots.to_vec()),
+            drawn: left.map_or_else(Vec::new, |left| left.checkpoint.drawn.to_vec()),
             probes: left.map_or_else(new_probes, |left| left.checkpoint.probes.to_vec()),
             probed,
             load_steps: left.map_or_else(Vec::new, |left| left.checkpoint.load_steps.to_vec()),
@@ -92,6 +97,7 @@ impl<'a> Recorder<'a> {
         }
         Recorded {
             snapshots: &self.snapshots,
+            drawn: &self.drawn,
             probes: &self.probes,
             load_steps: &self.load_steps,
             animation: self.animation.as_ref(),
@@ -104,8 +110,8 @@ impl<'a> Recorder<'a> {
         if engine.parted().is_none() {
             self.probes.iter_mut().for_each(|probe| probe.record(engine));
         }
-        if self.outputs.draws() && self.scene.record.figures.contains(&engine.step()) {
-            self.snapshots.push(Snapshot::of(engine));
+        if self.scene.record.figures.contains(&engine.step()) {
+            self.draw(engine);
         }
         if load_every(self.scene).is_some_and(|every| engine.step().is_multiple_of(every)) {
             self.measure(engine);
@@ -137,6 +143,20 @@ impl<'a> Recorder<'a> {
 
     fn keeps_frames(&self) -> bool {
         self.outputs.report || self.films
+    }
+
+    /// Keeps the configuration for its figures, or draws them now.
+    fn draw(&mut self, engine: &Engine) {
+        if !self.outputs.draws() {
+            return;
+        }
+        if !is_raster(engine.body().total()) {
+            self.snapshots.push(Snapshot::of(engine));
+            return;
+        }
+        let start = Instant::now();
+        self.drawn.extend(Drawn::of(self.scene, engine));
+        self.writing += start.elapsed();
     }
 
     fn measure(&mut self, engine: &Engine) {
@@ -176,8 +196,9 @@ impl<'a> Recorder<'a> {
         let engine = &outcome.engine;
         let (step, every) = (engine.step(), self.scene.record.vtk_every);
         self.receive_probes(engine);
-        if self.outputs.draws() && self.snapshots.last().is_none_or(|last| last.step != step) {
-            self.snapshots.push(Snapshot::of(engine));
+        let last = self.snapshots.last().map(|last| last.step).or(self.drawn.last().map(|last| last.step));
+        if last != Some(step) {
+            self.draw(engine);
         }
         if load_every(self.scene).is_some() && self.load_steps.last().is_none_or(|last| last.step != step) {
             self.measure(engine);
@@ -203,9 +224,9 @@ impl<'a> Recorder<'a> {
         let animation = self.animation.as_mut().filter(|_| is_written);
         let stage = animation.map(|animation| animation.stage(self.scene, outcome));
         let writing = self.writing + start.elapsed();
-        let Self { snapshots, probes, load_steps, animation, films, .. } = self;
+        let Self { snapshots, drawn, probes, load_steps, animation, films, .. } = self;
         let animation = animation.filter(|_| films);
-        Ok(Records { snapshots, probes, load_steps, stage, animation, writing })
+        Ok(Records { snapshots, drawn, probes, load_steps, stage, animation, writing })
     }
 }
 

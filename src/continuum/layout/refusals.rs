@@ -126,6 +126,10 @@ fn part_key(part: Part) -> String {
     }
 }
 
+/// The remedy for an outline that crosses itself, or whose area is lost beside its length.
+pub(super) const CORNERS: &str =
+    "give its corners in order, once around, with no side a billion times as long as the shape is wide";
+
 pub(super) fn refuse_outline(scene: &Scene, error: &OutlineError) -> SceneError {
     let (key, help) = match error {
         OutlineError::Touching { rings: [_, hole], .. }
@@ -136,7 +140,7 @@ pub(super) fn refuse_outline(scene: &Scene, error: &OutlineError) -> SceneError 
         ),
         OutlineError::SelfCrossing { ring, .. } | OutlineError::NoArea { ring, .. } => {
             let key = if *ring == 0 { "body.shape".into() } else { format!("body.holes[{}]", ring - 1) };
-            (key, "give its corners in order, once around")
+            (key, CORNERS)
         }
         OutlineError::TooDense { .. } => ("body.shape".into(), "or set body.outline = \"lattice\""),
     };

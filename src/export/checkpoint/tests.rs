@@ -25,7 +25,7 @@ fn written(folder: &Path) -> (EngineState<'static>, Vec<u8>) {
     let checkpoint = Checkpoint::new(
         (&asked, &scene, sum),
         (state.clone(), f64::INFINITY),
-        (&snapshots, &probes, &[], None),
+        (&snapshots, &[], &probes, &[], None),
         Duration::from_millis(1500),
     );
     checkpoint.write(folder).expect("written");

@@ -5,6 +5,7 @@ use super::colour::viridis;
 use super::raster::Raster;
 use super::svg::{Anchor, INK, Svg, text_width};
 use super::ticks::Ticks;
+use crate::ranks::Team;
 
 const LABEL_TEXT: f64 = 12.0;
 const NAME_TEXT: f64 = 13.0;
@@ -58,17 +59,18 @@ impl Bands {
         }
     }
 
-    /// Draws values at their places \[px\] as squares of the largest ones, of particles so far apart \[length\].
+    /// Draws values at their places \[px\] as squares of the largest ones, of particles so far apart \[length\]; each rank has
+    /// those of its part of a body.
     pub fn draw_raster(
         &self,
         svg: &mut Svg,
-        axes: &Axes,
-        spacing: f64,
+        (axes, spacing): (&Axes, f64),
         values: impl Iterator<Item = Sample>,
+        team: Option<&Team>,
     ) {
         let mut raster = Raster::over(axes, spacing);
         values.for_each(|(place, value)| raster.drop(place, value));
-        raster.draw(svg, self.count(), |value| self.of(value), |band| self.colour(band));
+        raster.of_all(team).draw(svg, self.count(), |value| self.of(value), |band| self.colour(band));
     }
 
     /// Room that the bar takes beside a plot \[px\].

@@ -72,7 +72,7 @@ pub fn overlay(pair: &Pair<'_>) -> String {
 impl Pair<'_> {
     /// See [`enlargement`].
     pub(super) fn factor(&self) -> f64 {
-        enlargement(self.reference, self.truth, || self.drawn())
+        enlargement(largest_of(self.truth, self.drawn()), self.bounds([self.reference]))
     }
 
     /// The particles that are matter: the frame and ghosts are no part of the truth.
@@ -96,17 +96,16 @@ pub(in crate::export) fn displaced(reference: &Vectors, displacement: &Vectors, 
     reference.iter().zip(displacement.iter()).map(moved).collect()
 }
 
-/// The factor by which displacements are drawn: 1, or 1, 2, 5 times a power of ten for those too small to be
-/// seen and those so large that the body would be lost beside them.
-pub(super) fn enlargement<D: Iterator<Item = usize>>(
-    reference: &Vectors,
-    displacement: &Vectors,
-    drawn: impl Fn() -> D,
-) -> f64 {
+/// The largest of these particles' displacements \[length\].
+pub(super) fn largest_of(displacement: &Vectors, drawn: impl Iterator<Item = usize>) -> f64 {
     let size = |u: [f64; 2]| u[0].hypot(u[1]);
-    let sizes = drawn().map(|i| size(displacement.get(i)));
-    let largest = sizes.filter(|u| u.is_finite()).fold(0.0, f64::max);
-    let (low, high) = reference.bounds(drawn()).unwrap_or_default();
+    drawn.map(|i| size(displacement.get(i))).filter(|u| u.is_finite()).fold(0.0, f64::max)
+}
+
+/// The factor by which displacements are drawn of which this one is the largest, of a body within these bounds: 1, or 1, 2, 5
+/// times a power of ten for those too small to be seen and those so large that the body would be lost beside them.
+pub(super) fn enlargement(largest: f64, reference: Option<Bounds>) -> f64 {
+    let [low, high] = reference.unwrap_or_default();
     let part = largest / (high[0] - low[0]).max(high[1] - low[1]);
     if !part.is_normal() || (SEEN..=LOST).contains(&part) {
         return 1.0;

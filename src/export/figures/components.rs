@@ -4,12 +4,11 @@ use super::Subject;
 use super::axes::Axes;
 use super::comparison::scale_note;
 use super::heading::Heading;
-use super::page;
+use super::page::{self, Bounds};
 use super::panels::{MOST_CELLS, Panel, Scale, Sheet, arranged};
-use super::stress::{drawn, enlarged};
+use super::stress::{bounds, enlarged};
 use crate::continuum::record::Snapshot;
 use crate::flock::rules::Rotation;
-use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 use crate::material::stress::StressState;
 
@@ -28,13 +27,16 @@ pub fn components(
 ) -> String {
     let (places, factor) = enlarged(subject, snapshot);
     let spacing = subject.body.lattice.spacing();
-    let (axes, is_row) = window(&places, drawn(snapshot), spacing);
-    let finite = || stresses.iter().flat_map(|stress| stress.components).filter(|s| s.is_finite());
-    let largest = finite().fold(0.0, |largest: f64, s| largest.max(s.abs()));
+    let (axes, is_row) = window(bounds(subject, snapshot, &places), spacing);
+    let own = || subject.owned(cells).filter_map(|cell| Some((cell, stresses.get(cell)?.components)));
+    let finite = own().flat_map(|(_, components)| components).filter(|s| s.is_finite());
+    let [largest] = subject.largest([finite.fold(0.0, |largest: f64, s| largest.max(s.abs()))]);
     let of = |k: usize| -> Vec<f64> {
-        let value = |stress: &StressState| stress.components[k];
+        let mut values = vec![f64::NAN; cells.count()];
         // Rounding has no sign worth a colour.
-        stresses.iter().map(value).map(|s| if s.abs() < NOISE * largest { 0.0 } else { s }).collect()
+        let value = |s: f64| if s.abs() < NOISE * largest { 0.0 } else { s };
+        own().for_each(|(cell, components)| values[cell] = value(components[k]));
+        values
     };
     let by_component = [0, 1, 2].map(of);
     let panels =
@@ -45,13 +47,15 @@ pub fn components(
         page::note(subject, snapshot),
         scale_note(factor)
     );
-    if cells.count() > MOST_CELLS {
-        note += &format!("; {} cells drawn as squares of their largest value", cells.count());
+    let count = subject.count(subject.owned(cells).count());
+    let is_raster = subject.is_raster() || count > MOST_CELLS;
+    if is_raster {
+        note += &format!("; {count} cells drawn as squares of their largest value");
     }
     let heading = Heading { title: subject.title.into(), note, ..Heading::default() };
     let scales = vec![Scale::around_zero("stress", largest, 10.0)];
-    Sheet { axes, is_row, scales, heading, cells, unit: subject.unit, stress_unit: unit, spacing }
-        .draw(&panels)
+    let (team, stress_unit, unit) = (subject.team, unit, subject.unit);
+    Sheet { axes, is_row, scales, heading, cells, is_raster, team, unit, stress_unit, spacing }.draw(&panels)
 }
 
 /// Words on the axes of stresses where they are not those of the plane.
@@ -63,11 +67,6 @@ fn axes_note(rotation: Rotation) -> &'static str {
 }
 
 /// The plot of each component, and whether the three stand in a row.
-pub(in crate::export) fn window(
-    places: &Vectors,
-    drawn: impl Iterator<Item = usize>,
-    spacing: f64,
-) -> (Axes, bool) {
-    let bounds = page::bounds(places, drawn);
+pub(in crate::export) fn window(bounds: Option<Bounds>, spacing: f64) -> (Axes, bool) {
     arranged(|room| page::within(bounds, spacing, room))
 }

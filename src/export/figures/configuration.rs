@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 
+use super::Subject;
 use super::axes::Axes;
 use super::bands::{Bands, Field};
 use super::colour;
@@ -10,7 +11,6 @@ use super::heading::{Heading, Key, Mark, draw_mark};
 use super::page::{self, Bounds};
 use super::raster::Raster;
 use super::svg::{Path, Svg};
-use super::{MOST_DOTS, Subject};
 use crate::continuum::record::Snapshot;
 use crate::export::bonds;
 use crate::flock::role::Role;
@@ -36,11 +36,12 @@ enum Style {
 
 impl Style {
     fn of(subject: &Subject<'_>, is_field: bool) -> Self {
-        match subject.body.count() {
-            count if count > MOST_DOTS => Self::Raster,
-            // Where neighbours are found anew at every step there are no faces to fill.
-            count if count > MOST_COLOURED_DOTS && is_field && subject.neighbours.is_some() => Self::Surface,
-            _ => Self::Dots,
+        // Where neighbours are found anew at every step there are no faces to fill.
+        let has_faces = is_field && subject.neighbours.is_some();
+        match subject.is_raster() {
+            true => Self::Raster,
+            false if has_faces && subject.body.count() > MOST_COLOURED_DOTS => Self::Surface,
+            false => Self::Dots,
         }
     }
 }
@@ -60,7 +61,7 @@ pub(super) fn mark_of(role: Role) -> Mark {
 /// Particles as dots in the colours of their roles, leaders as diamonds, clamped ones as squares, live bonds grey, broken ones dashed red.
 pub fn configuration(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
     let mut setting = Setting::default();
-    setting.include(snapshot, None);
+    setting.include(subject, snapshot, None);
     configuration_in(&setting, subject, snapshot, page::note(subject, snapshot), None)
 }
 
@@ -91,10 +92,14 @@ impl Setting {
     }
 
     /// Makes room for this configuration, and for these values of its particles, shape \[count\].
-    pub fn include(&mut self, snapshot: &Snapshot, values: Option<&[f64]>) {
-        let within = page::bounds(&snapshot.positions, 0..snapshot.positions.len());
+    pub fn include(&mut self, subject: &Subject<'_>, snapshot: &Snapshot, values: Option<&[f64]>) {
+        let owned = subject.body.owned();
+        let within = subject.bounds(page::bounds(&snapshot.positions, owned.clone()));
         self.bounds = page::around_both(self.bounds, within);
-        let is_present = |role: &Role| self.roles.contains(role) || snapshot.roles.contains(role);
+        let is_here = |role: Role| f64::from(snapshot.roles[owned.clone()].contains(&role));
+        let are_present = subject.largest(PAINTING_ORDER.map(is_here));
+        let is_there = |role: Role| PAINTING_ORDER.into_iter().zip(are_present).any(|one| one == (role, 1.0));
+        let is_present = |role: &Role| self.roles.contains(role) || is_there(*role);
         self.roles = PAINTING_ORDER.into_iter().filter(is_present).collect();
         self.has_broken_bonds |= !snapshot.broken.is_empty();
         let of_bodies = snapshot.roles.iter().zip(values.into_iter().flatten());
@@ -121,7 +126,7 @@ impl Setting {
     fn heading(&self, subject: &Subject<'_>, mut note: String, is_field: bool) -> Heading {
         let style = Style::of(subject, is_field);
         if style == Style::Raster {
-            note += &format!("; {} particles drawn as squares", subject.body.count());
+            note += &format!("; {} particles drawn as squares", subject.body.total());
         }
         // Surfaces and squares have the colours of the field alone.
         let legend = match style {
@@ -167,8 +172,12 @@ pub fn configuration_in(
     let beside = beside(field.map(|field| field.bands));
     page::with_body(&heading, axes, subject.unit, beside, |svg, axes| {
         match (style, field) {
-            (Style::Raster, None) => draw_raster(svg, axes, snapshot, spacing),
-            (Style::Raster, Some(field)) => draw_field_raster(svg, axes, snapshot, field, spacing),
+            (Style::Raster, None) => draw_raster(svg, axes, subject, snapshot),
+            (Style::Raster, Some(field)) => {
+                let drawn = subject.drawn(&snapshot.roles);
+                let values = drawn.map(|i| (axes.place(snapshot.positions.get(i)), field.values[i]));
+                field.bands.draw_raster(svg, (axes, spacing), values, subject.team);
+            }
             (Style::Surface, Some(field)) => {
                 let is_shown = |i: usize| snapshot.roles[i].is_body() && field.values[i].is_finite();
                 let is_drawn: Vec<bool> = (0..field.values.len()).map(is_shown).collect();
@@ -299,12 +308,6 @@ fn draw_rails(svg: &mut Svg, axes: &Axes, subject: &Subject<'_>, snapshot: &Snap
     });
 }
 
-fn draw_field_raster(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, field: &Field<'_>, spacing: f64) {
-    let drawn = snapshot.positions.iter().enumerate().filter(|(i, _)| snapshot.roles[*i].is_body());
-    let values = drawn.map(|(i, place)| (axes.place(place), field.values[i]));
-    field.bands.draw_raster(svg, axes, spacing, values);
-}
-
 /// Dots leave gaps through which bonds are seen \[px\].
 pub(super) fn dot_radius(axes: &Axes, spacing: f64) -> f64 {
     (0.3 * spacing * axes.scale()).clamp(0.6, 8.0)
@@ -321,18 +324,17 @@ const SQUARE_ORDER: [Option<Role>; 6] = [
     Some(Role::Leader),
 ];
 
-fn draw_raster(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, spacing: f64) {
-    let mut raster = Raster::over(axes, spacing);
-    let mut drop = |place: [f64; 2], shown: Option<Role>| {
+fn draw_raster(svg: &mut Svg, axes: &Axes, subject: &Subject<'_>, snapshot: &Snapshot) {
+    let (body, owned) = (subject.body, subject.body.owned());
+    let mut raster = Raster::over(axes, body.lattice.spacing());
+    let mut drop = |particle: usize, shown: Option<Role>| {
         let rank = SQUARE_ORDER.iter().position(|&other| other == shown).unwrap_or(0);
-        raster.drop(axes.place(place), rank as f64);
+        raster.drop(axes.place(snapshot.positions.get(particle)), rank as f64);
     };
-    for (place, &role) in snapshot.positions.iter().zip(&snapshot.roles) {
-        drop(place, Some(role));
-    }
-    for &end in snapshot.broken.iter().flatten() {
-        drop(snapshot.positions.get(end as usize), None);
-    }
+    owned.clone().for_each(|i| drop(i, Some(snapshot.roles[i])));
+    let ends = snapshot.broken.iter().flatten().filter_map(|&end| body.exact_particle(end as usize));
+    ends.filter(|i| owned.contains(i)).for_each(|i| drop(i, None));
+    let raster = raster.of_all(subject.team);
     let colour = |n: usize| SQUARE_ORDER[n].map_or(colour::BROKEN_BOND_SQUARE, colour::of_role).to_owned();
     raster.draw(svg, SQUARE_ORDER.len(), |rank| rank as usize, colour);
 }

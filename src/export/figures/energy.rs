@@ -1,5 +1,6 @@
 //! PE1 as filled contours over the deformed body.
 
+use super::Subject;
 use super::axes::Axes;
 use super::bands::{Bands, Sample, at_least, triangles};
 use super::configuration::dot_radius;
@@ -7,7 +8,6 @@ use super::faces::faces;
 use super::heading::Heading;
 use super::page;
 use super::svg::{Path, Svg};
-use super::{MOST_DOTS, Subject};
 use crate::continuum::record::Snapshot;
 
 /// PE1 comes from differences of positions, whose last digits are rounding: what is below the
@@ -19,27 +19,27 @@ const NOISE_IN_SPACINGS: f64 = 1e-10;
 /// ghosts, which are no matter, are left out.
 pub fn pe1(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
     let spacing = subject.body.lattice.spacing();
-    let is_drawn: Vec<bool> = (0..snapshot.roles.len())
-        .map(|i| snapshot.roles[i].is_body() && snapshot.positions.get(i).iter().all(|v| v.is_finite()))
-        .collect();
-    let drawn: Vec<usize> = (0..is_drawn.len()).filter(|&i| is_drawn[i]).collect();
-    let (low, high) = drawn
-        .iter()
-        .map(|&i| snapshot.pe1[i])
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
-    let bands = Bands::around(low, high, (NOISE_IN_SPACINGS * spacing).powi(2));
-    let axes = page::window(&snapshot.positions, drawn.iter().copied(), spacing);
+    let is_somewhere = |i: &usize| snapshot.positions.get(*i).iter().all(|v| v.is_finite());
+    let drawn = || subject.drawn(&snapshot.roles).filter(is_somewhere);
+    let ends = drawn()
+        .map(|i| snapshot.pe1[i])
+        .fold([f64::NEG_INFINITY; 2], |[below, high], value| [below.max(-value), high.max(value)]);
+    let [below, high] = subject.largest(ends);
+    let bands = Bands::around(-below, high, (NOISE_IN_SPACINGS * spacing).powi(2));
+    let axes = page::around(subject.bounds(page::bounds(&snapshot.positions, drawn())), spacing);
     let note = format!("first pseudo-energy, {}", page::note(subject, snapshot));
     let mut heading = Heading { title: subject.title.into(), note, ..Heading::default() };
-    let is_raster = drawn.len() > MOST_DOTS;
-    if is_raster {
-        heading.note += &format!("; {} particles drawn as squares of their largest value", drawn.len());
+    if subject.is_raster() {
+        let count = subject.count(drawn().count());
+        heading.note += &format!("; {count} particles drawn as squares of their largest value");
     }
     page::with_body(&heading, axes, subject.unit, bands.bar_room(), |svg, axes| {
-        if is_raster {
-            let value = |&i: &usize| (axes.place(snapshot.positions.get(i)), snapshot.pe1[i]);
-            bands.draw_raster(svg, axes, spacing, drawn.iter().map(value));
+        if subject.is_raster() {
+            let value = |i: usize| (axes.place(snapshot.positions.get(i)), snapshot.pe1[i]);
+            bands.draw_raster(svg, (axes, spacing), drawn().map(value), subject.team);
         } else {
+            let mut is_drawn = vec![false; snapshot.roles.len()];
+            drawn().for_each(|i| is_drawn[i] = true);
             draw_contours(svg, axes, subject, (snapshot, &snapshot.pe1), &is_drawn, &bands);
         }
         bands.draw_bar(svg, axes, "PE1", &format!("{}²", subject.unit));

@@ -38,7 +38,9 @@ use crate::engine::Engine;
 use crate::engine::setup::RoleChange;
 use crate::flock::body::Body;
 use crate::flock::neighbourhood::Neighbours;
+use crate::flock::role::Role;
 use crate::material::cells::Cells;
+use crate::ranks::Team;
 use crate::scene::Scene;
 pub use colour::SERIES;
 pub(super) use comparison::displaced;
@@ -46,6 +48,7 @@ pub use comparison::{Pair, overlay};
 pub use components::components;
 pub use configuration::configuration;
 pub use energy::pe1;
+use page::Bounds;
 pub use probes::probes;
 pub(super) use stress::displacement;
 pub use stress::stress;
@@ -71,6 +74,8 @@ pub struct Subject<'a> {
     pub counts: &'static str,
     /// Whether the body was solved for its equilibrium: no steps lead there.
     pub is_solved_at_once: bool,
+    /// The ranks that draw it together, if each has a part of the body; the first one has the figure in the end.
+    pub team: Option<&'a Team>,
 }
 
 impl<'a> Subject<'a> {
@@ -85,15 +90,53 @@ impl<'a> Subject<'a> {
             changes: engine.changes(),
             counts: scene.counts(),
             is_solved_at_once: scene.is_solved_at_once(),
+            team: engine.parted(),
         }
     }
+
+    /// Whether its particles are too many for each to be seen.
+    fn is_raster(&self) -> bool {
+        is_raster(self.body.total())
+    }
+
+    /// The particles of this part, of a whole body all, that are matter.
+    fn drawn(&self, roles: &[Role]) -> impl Iterator<Item = usize> {
+        self.body.owned().filter(|&i| roles[i].is_body())
+    }
+
+    /// The cells of this part, of a whole body all.
+    fn owned(&self, cells: &Cells) -> impl Iterator<Item = usize> + use<> {
+        cells.owned(self.body).into_iter().flatten()
+    }
+
+    /// The largest of numbers of all parts, none of which is NaN.
+    fn largest<const N: usize>(&self, own: [f64; N]) -> [f64; N] {
+        self.team.map_or(own, |team| team.largest(own))
+    }
+
+    /// How many there are in all parts.
+    fn count(&self, own: usize) -> usize {
+        self.team.map_or(own, |team| team.sum([own as u64])[0] as usize)
+    }
+
+    /// What lies within the bounds of any part.
+    fn bounds(&self, own: Option<Bounds>) -> Option<Bounds> {
+        let reach = own.map_or([f64::NEG_INFINITY; 4], |[low, high]| [-low[0], -low[1], high[0], high[1]]);
+        let [left, down, right, up] = if self.team.is_some() { self.largest(reach) } else { return own };
+        (left > f64::NEG_INFINITY).then_some([[-left, -down], [right, up]])
+    }
+}
+
+/// Whether a body of so many particles is drawn as a raster, by ranks together that have a part of it each.
+pub fn is_raster(count: usize) -> bool {
+    count > MOST_DOTS
 }
 
 /// Pixels of a PNG for a \[px\] of the sheet: text is as large in all of them, and no sheet takes more than some 20 MB.
 pub const PNG_ZOOM: f32 = 2.0;
 
 /// More particles than this are drawn as a raster: an SVG of a million circles opens nowhere.
-pub(super) const MOST_DOTS: usize = 60_000;
+const MOST_DOTS: usize = 60_000;
 
 /// A figure as PNG, `width` pixels wide; the error is a reason.
 pub(super) fn render(svg: &str, width: f32) -> Result<Vec<u8>, String> {

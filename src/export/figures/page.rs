@@ -37,11 +37,6 @@ pub fn width_of(axes: &Axes, beside: f64) -> f64 {
     (axes.left_of_plot() + axes.size[0] + beside).max(NARROWEST)
 }
 
-/// The window that shows every particle that is drawn.
-pub fn window(positions: &Vectors, drawn: impl Iterator<Item = usize>, spacing: f64) -> Axes {
-    around(bounds(positions, drawn), spacing)
-}
-
 /// Lowest and highest place.
 pub type Bounds = [[f64; 2]; 2];
 

@@ -8,6 +8,7 @@ use super::svg::{Anchor, INK, Path, Svg, text_width};
 use super::ticks::Ticks;
 use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
+use crate::ranks::Team;
 
 /// Shades of the colour bar: more than the eye distinguishes, and an odd number, so that one is in the middle.
 const SHADES: usize = 97;
@@ -175,6 +176,10 @@ pub struct Sheet<'a> {
     pub scales: Vec<Scale>,
     pub heading: Heading,
     pub cells: &'a Cells,
+    /// Whether cells are too many for each to be seen.
+    pub is_raster: bool,
+    /// The ranks that draw together, if each has a part of the body.
+    pub team: Option<&'a Team>,
     /// Name of the unit of length.
     pub unit: &'a str,
     /// Name of the unit of stress; may be empty.
@@ -217,7 +222,7 @@ impl Sheet<'_> {
         let name_at = [axes.corner[0] + axes.size[0] / 2.0, axes.corner[1] - 0.6 * NAME_TEXT - 2.0];
         svg.text(name_at, Anchor::Middle, NAME_TEXT, INK, panel.name);
         let scale = &self.scales[panel.scale];
-        let is_raster = self.cells.count() > MOST_CELLS;
+        let is_raster = self.is_raster;
         let paths = if is_raster { self.squares(panel, scale) } else { self.polygons(panel, scale) };
         // A hairline of its own colour around each cell covers the seams between cells.
         let line = if is_raster {
@@ -258,11 +263,11 @@ impl Sheet<'_> {
     }
 
     fn squares(&self, panel: &Panel<'_>, scale: &Scale) -> Vec<Path> {
-        let mut raster = Raster::over(&self.axes, self.spacing);
+        let mut raster = Raster::of_size_over(&self.axes, self.spacing);
         for (corners, stress) in self.shown(panel) {
             let corners: Vectors = corners.into_iter().collect();
-            raster.drop_largest_in_size(corners.middle(), stress);
+            raster.drop(corners.middle(), stress);
         }
-        raster.paths(SHADES + 1, |stress| scale.shade(stress))
+        raster.of_all(self.team).paths(SHADES + 1, |stress| scale.shade(stress))
     }
 }

@@ -3,6 +3,7 @@
 use super::PNG_ZOOM;
 use super::axes::Axes;
 use super::svg::{Path, Svg};
+use crate::ranks::Team;
 
 /// Squares over a plot; those that nothing fell into stay empty.
 #[derive(Clone, Debug)]
@@ -11,6 +12,8 @@ pub struct Raster {
     side: f64,
     columns: usize,
     largest: Vec<Option<f64>>,
+    /// The number by which one value is larger than another.
+    size: fn(f64) -> f64,
 }
 
 impl Raster {
@@ -21,28 +24,44 @@ impl Raster {
         let side = ((2.0 * spacing * axes.scale()).max(2.0) / PIXEL).ceil() * PIXEL;
         let corner = axes.corner.map(|along| (along / PIXEL).floor() * PIXEL);
         let [columns, rows] = axes.size.map(|length| (length / side) as usize + 2);
-        Self { corner, side, columns, largest: vec![None; columns * rows] }
+        Self { corner, side, columns, largest: vec![None; columns * rows], size: |value| value }
+    }
+
+    /// The same for values of either sign: that which is larger in size stays, of two alike the positive one.
+    pub fn of_size_over(axes: &Axes, spacing: f64) -> Self {
+        Self { size: f64::abs, ..Self::over(axes, spacing) }
     }
 
     /// Lets `value` fall onto the sheet at `place` \[px\].
     pub fn drop(&mut self, place: [f64; 2], value: f64) {
-        self.drop_greater(place, value, |value| value);
-    }
-
-    /// The same where values have either sign: that which is larger in size stays.
-    pub fn drop_largest_in_size(&mut self, place: [f64; 2], value: f64) {
-        self.drop_greater(place, value, f64::abs);
-    }
-
-    fn drop_greater(&mut self, place: [f64; 2], value: f64, size: fn(f64) -> f64) {
         let [column, row] = [0, 1].map(|k| (place[k] - self.corner[k]) / self.side);
-        if column >= 0.0
-            && row >= 0.0
-            && (column as usize) < self.columns
-            && let Some(square) = self.largest.get_mut(row as usize * self.columns + column as usize)
-        {
-            *square = Some(square.filter(|&largest| size(largest) >= size(value)).unwrap_or(value));
+        if column >= 0.0 && row >= 0.0 && (column as usize) < self.columns {
+            self.keep(row as usize * self.columns + column as usize, value);
         }
+    }
+
+    fn keep(&mut self, square: usize, value: f64) {
+        let Self { largest, size, .. } = self;
+        if let Some(square) = largest.get_mut(square) {
+            let is_larger = |kept: &f64| (size(*kept), *kept) >= (size(value), value);
+            *square = Some(square.filter(is_larger).unwrap_or(value));
+        }
+    }
+
+    /// What fell onto the sheets of all ranks, for the first one, where each lets its own part of a body fall.
+    pub fn of_all(mut self, team: Option<&Team>) -> Self {
+        let Some(team) = team else { return self };
+        if !team.is_first() {
+            team.send_bytes(&postcard::to_stdvec(&self.largest).expect("numbers can be written"));
+            return self;
+        }
+        for rank in 1..team.count() {
+            let theirs: Vec<Option<f64>> =
+                postcard::from_bytes(&team.receive_bytes(rank)).expect("as they were sent");
+            let fell = theirs.into_iter().enumerate().filter_map(|(square, value)| Some((square, value?)));
+            fell.for_each(|(square, value)| self.keep(square, value));
+        }
+        self
     }
 
     /// The squares of each class, neighbours in a row joined, as one path per class.

@@ -3,10 +3,10 @@
 use super::Subject;
 use super::axes::Axes;
 use super::bands::{Bands, Sample};
-use super::comparison::{displaced, enlargement, scale_note};
+use super::comparison::{displaced, enlargement, largest_of, scale_note};
 use super::energy::draw_bands;
 use super::heading::Heading;
-use super::page;
+use super::page::{self, Bounds};
 use super::svg::{Path, Svg};
 use crate::continuum::mechanics::Stresses;
 use crate::continuum::record::Snapshot;
@@ -30,24 +30,27 @@ pub fn stress(
     unit: &str,
 ) -> String {
     let (places, factor) = enlarged(subject, snapshot);
-    let shown: Vec<(&[u32], f64)> = cells
-        .iter()
-        .zip(stresses.cells.iter().map(|stress| stress.von_mises))
+    let shown: Vec<(&[u32], f64)> = subject
+        .owned(cells)
+        .filter_map(|cell| Some((cells.of(cell), stresses.cells.get(cell)?.von_mises)))
         .filter(|(cell, value)| {
             value.is_finite() && cell.iter().all(|&i| places.get(i as usize).iter().all(|v| v.is_finite()))
         })
         .collect();
-    let corners = at_corners(cells, stresses).filter(|_| shown.len() <= MOST_SHOWN);
+    let count = subject.count(shown.len());
+    let is_raster = subject.is_raster() || count > MOST_SHOWN;
+    let corners = at_corners(cells, stresses).filter(|_| !is_raster);
     let values = shown.iter().map(|(_, value)| *value).chain(corners.iter().flatten().copied().flatten());
-    let range = values.fold([f64::INFINITY, 0.0], |[low, high], v| [f64::min(low, v), f64::max(v, high)]);
-    let bands = Bands::fine(range[0].min(range[1]), range[1], NOISE * range[1]);
-    let axes = page::window(&places, drawn(snapshot), subject.body.lattice.spacing());
+    let ends = values.fold([f64::NEG_INFINITY, 0.0], |[below, high], v| [f64::max(below, -v), high.max(v)]);
+    let [below, high] = subject.largest(ends);
+    let bands = Bands::fine(high.min(-below), high, NOISE * high);
+    let spacing = subject.body.lattice.spacing();
+    let axes = page::around(bounds(subject, snapshot, &places), spacing);
     let place = if corners.is_some() { "" } else { " in the cells" };
     let mut note =
         format!("von Mises stress{place}, {}{}", page::note(subject, snapshot), scale_note(factor));
-    let is_raster = shown.len() > MOST_SHOWN;
     if is_raster {
-        note += &format!("; {} cells drawn as squares of their largest value", shown.len());
+        note += &format!("; {count} cells drawn as squares of their largest value");
     }
     let heading = Heading { title: subject.title.into(), note, ..Heading::default() };
     page::with_body(&heading, axes, subject.unit, bands.bar_room(), |svg, axes| {
@@ -55,7 +58,7 @@ pub fn stress(
             let middle =
                 |cell: &[u32]| cell.iter().map(|&i| places.get(i as usize)).collect::<Vectors>().middle();
             let value = |(cell, value): &(&[u32], f64)| (axes.place(middle(cell)), *value);
-            bands.draw_raster(svg, axes, subject.body.lattice.spacing(), shown.iter().map(value));
+            bands.draw_raster(svg, (axes, spacing), shown.iter().map(value), subject.team);
         } else if let Some(values) = &corners {
             draw_bands(svg, &patches(axes, &places, &shown, values), &bands);
         } else {
@@ -89,16 +92,17 @@ fn patches(
     shown.iter().map(patch).collect()
 }
 
-/// The particles that are matter.
-pub(super) fn drawn(snapshot: &Snapshot) -> impl Iterator<Item = usize> {
-    (0..snapshot.roles.len()).filter(|&i| snapshot.roles[i].is_body())
+/// Lowest and highest of the places of what is matter, of all parts of a body.
+pub(super) fn bounds(subject: &Subject<'_>, snapshot: &Snapshot, places: &Vectors) -> Option<Bounds> {
+    subject.bounds(page::bounds(places, subject.drawn(&snapshot.roles)))
 }
 
 /// Where particles are drawn, and the factor by which their displacements are enlarged for that.
 pub(super) fn enlarged(subject: &Subject<'_>, snapshot: &Snapshot) -> (Vectors, f64) {
     let (reference, displacement) = (&subject.body.reference, displacement(subject, snapshot));
     // Large displacements are drawn as they are: a bent body is to look as bent as it is.
-    let factor = enlargement(reference, &displacement, || drawn(snapshot)).max(1.0);
+    let [largest] = subject.largest([largest_of(&displacement, subject.drawn(&snapshot.roles))]);
+    let factor = enlargement(largest, bounds(subject, snapshot, reference)).max(1.0);
     (displaced(reference, &displacement, factor), factor)
 }
 

@@ -3,7 +3,7 @@
 use super::comparison::{Pair, scale_note};
 use super::heading::Heading;
 use super::page;
-use super::panels::{Panel, Scale, Sheet, arranged};
+use super::panels::{MOST_CELLS, Panel, Scale, Sheet, arranged};
 
 /// Name of the third panel and of its scale.
 const DIFFERENCE: &str = "|rule \u{2212} truth|";
@@ -30,7 +30,9 @@ pub fn von_mises(pair: &Pair<'_>, rule: &[f64], truth: &[f64]) -> String {
         ..Heading::default()
     };
     let Pair { cells, unit, stress_unit, spacing, .. } = *pair;
-    Sheet { axes, is_row, scales, heading, cells, unit, stress_unit, spacing }.draw(&panels)
+    let is_raster = cells.count() > MOST_CELLS;
+    Sheet { axes, is_row, scales, heading, cells, is_raster, team: None, unit, stress_unit, spacing }
+        .draw(&panels)
 }
 
 fn largest(stress: &[f64]) -> f64 {

@@ -53,7 +53,7 @@ pub fn film<'a>(
     let subject = Subject::of(scene, &outcome.engine);
     for &frame in &frames {
         let (snapshot, values) = (shown.snapshot(frame), shown.values(frame));
-        setting.include(&snapshot, values.as_deref());
+        setting.include(&subject, &snapshot, values.as_deref());
     }
     let scale = shown.scale(&setting);
     for &frame in &frames {

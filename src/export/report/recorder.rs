@@ -154,7 +154,7 @@ impl RunRecorder {
         let values = vec![Vec::new(); channels.len()];
         let frames = Frames::new(count, channels);
         let first_roles = roles.clone();
-        let is_recovered = sample.is_some() || scene.equilibrium.is_some();
+        let is_recovered = scene.equilibrium.is_some();
         let (changes, is_solved) = (Vec::new(), false);
         Self { frames, first_roles, roles, changes, values, is_solved, is_recovered, sample }
     }

@@ -90,6 +90,16 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
     if let Some(first) = animation.times.first().filter(|&&first| first > 0.0 && !is_solved) {
         note += &format!(" This run was resumed at step {first}; earlier steps are not shown.");
     }
+    // The page computes it of steps, or frames keep it as the page would.
+    let is_mean =
+        animation.stress.is_some() || (is_sample && !is_solved && animation.clock.quantity == "step");
+    let before_the_last = match is_mean && outcome.engine.free_edge().is_some() {
+        true => {
+            " Stress before the last frame is the mean of each particle's cells, at the last recovered along the outline too, as in \
+             final.csv and films."
+        }
+        false => "",
+    };
     if is_sample {
         note += &format!(
             " Ranks had a part of the body each: {} of its {} particles are shown, one of {} along either axis of the lattice, without bonds and cells. All values are kept to {bits} bits of each frame's range, or fewer.",
@@ -97,7 +107,7 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
             body.total(),
             stride_of(body.total()),
         );
-        return note + " final.csv has all of them, to the last digit.";
+        return note + before_the_last + " final.csv has all of them, to the last digit.";
     }
     let computed = if animation.stress.is_some() { "PE1, strain and stress" } else { "PE1 and strain" };
     note += &format!(
@@ -108,10 +118,7 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
         let when = if animation.exact.is_empty() { "" } else { " before the last frame" };
         note += &format!(" That leaves strains{when} uncertain by about {}.", number(strain));
     }
-    if animation.stress.is_some() && outcome.engine.free_edge().is_some() {
-        note += " Stress before the last frame is the mean of each particle's cells, at the last recovered along the outline too, as in \
-                 final.csv and films.";
-    }
+    note += before_the_last;
     note += if animation.exact.is_empty() {
         " The body is too large for its last numbers to be kept exactly: final.csv has them."
     } else {

@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, SyncSender};
 use crate::messages::flockform_msgs::{LoopEvent, SetFormationRequest};
 use crate::messages::formation::leaders::{as_event, set_formation};
 use crate::scene::swarm::raw::RawCommands;
-use crate::swarm::control::Control;
+use crate::swarm::control::{Control, Mode};
 
 /// A command, as a service of the node takes it.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,7 +78,11 @@ impl Commanded<'_> {
             NodeCommand::SetFormation(request) => {
                 let done = set_formation(self.control, request)?;
                 self.events.push(as_event(request));
-                Ok(done)
+                Ok(match self.control.mode() {
+                    Mode::Running => done,
+                    Mode::EmergencyStopped => format!("{done}; it waits for ~/resume"),
+                    Mode::Inactive => format!("{done}; it waits until the node is active"),
+                })
             }
             NodeCommand::ChangeState(label) => {
                 Err(format!("{label}: another transition is made in this period"))

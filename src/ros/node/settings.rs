@@ -72,6 +72,15 @@ pub(super) fn declare(
             .describe("highest acceleration of a robot [m/s^2]"),
         Declaration::new("clearance", limits.clearance)
             .range(limits.clearance..=limits.clearance.max(1000.0))
+            .checked("where the swarm file has one", {
+                let (keeps_apart, own) = (limits.keeps_apart, limits.clearance);
+                move |_, value| match keeps_apart || value.as_double() == Some(own) {
+                    true => Ok(()),
+                    false => Err("robots are kept apart from each other only where the swarm file has limits.clearance: give it \
+                                  there, 0.0 is enough"
+                        .into()),
+                }
+            })
             .describe("free space kept between two robots, or a robot and an obstacle [m]"),
         Declaration::new("damping", control.damping())
             .range(0.0..=2.0)

@@ -174,7 +174,8 @@ impl Default for RawStop {
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RawRecord {
-    /// Ids of the particles whose coordinates and pseudo-energies are kept at every step.
+    /// Ids of the particles whose coordinates and pseudo-energies are kept at every step; one that is named twice is kept once.
+    #[schemars(inner(range(min = 1)))]
     pub probes: Vec<usize>,
     /// Places of the undeformed body [x, y] at which `run` reports displacement and stress at the end, and `compare`
     /// sets them beside the reference's; needs a material [length].

@@ -78,7 +78,7 @@ pub enum RawRegion {
     Ids {
         /// Counted from 1, column by column from the bottom, the frame included; of a body of points, those of its
         /// file [1].
-        #[schemars(length(min = 1))]
+        #[schemars(length(min = 1), inner(range(min = 1)))]
         ids: Vec<usize>,
     },
     /// Every particle that lacks a neighbour: the outline, rims of holes included.

@@ -25,7 +25,7 @@ pub enum Mode {
     /// Members get targets by the rule.
     #[default]
     Running,
-    /// Every member holds the place it had when the stop came, until the stop is lifted.
+    /// Every member comes to rest as soon as it can and holds that place, until the stop is lifted.
     EmergencyStopped,
     /// No member gets a target.
     Inactive,
@@ -121,7 +121,7 @@ pub struct Control {
     ages: Vec<f64>,
     wanted: Vectors,
     safe: Vectors,
-    /// Places that members hold in an emergency stop.
+    /// Places that members hold in an emergency stop \[m\].
     held: Vec<Option<[f64; 2]>>,
     tracked: Tracked,
     filtered: Vec<Flags>,
@@ -253,7 +253,7 @@ impl Control {
         let (dynamics, deviation) = (self.dynamics(), self.filter.limits().deviation);
         match (&verdict, &mut self.tracks[member]) {
             (Ok(()), track) if self.brakes => track.correct(&pose, &dynamics, self.period, deviation),
-            (Ok(()), track) => track.note(&pose),
+            (Ok(()), track) => track.note(&pose, self.period),
             (Err(_), _) => {}
         }
         verdict
@@ -438,20 +438,30 @@ impl Control {
         self.ticks += 1;
         self.now = now;
         self.look(now);
-        match self.mode {
-            Mode::Inactive => self.wanted.clone_from(&self.present),
-            Mode::EmergencyStopped => self.hold(),
-            Mode::Running => self.follow(),
+        self.follow_tracks(now);
+        if self.mode == Mode::Running {
+            self.follow();
         }
         let active = self.mode != Mode::Inactive;
-        self.follow_tracks(now);
         let Self { present, velocity, ages, usable: known, tracked, .. } = self;
+        let places = &*present;
         let (present, velocity, ages) = match self.brakes {
             true => (&tracked.present, &tracked.velocity, &tracked.ages),
             false => (&*present, &*velocity, &*ages),
         };
         let seen =
             safety::Seen { present, known, ages, velocity: Some(velocity), strays: Some(&tracked.strays) };
+        match self.mode {
+            Mode::Inactive => self.wanted.clone_from(places),
+            Mode::EmergencyStopped => {
+                for member in (0..known.len()).filter(|&member| known[member]) {
+                    let stops = || self.filter.stopping_place(&seen, self.period, member);
+                    let place = *self.held[member].get_or_insert_with(stops);
+                    self.wanted.set(member, place);
+                }
+            }
+            Mode::Running => {}
+        }
         self.filter.apply(&seen, &self.wanted, self.period, &mut self.safe, &mut self.filtered);
         for member in 0..self.tracks.len() {
             let target = self.target(member);
@@ -525,13 +535,6 @@ impl Control {
                 stray.error = 0.0;
                 stray.places.clear();
             }
-        }
-    }
-
-    fn hold(&mut self) {
-        for member in (0..self.formation.count()).filter(|&member| self.usable[member]) {
-            let place = *self.held[member].get_or_insert_with(|| self.present.get(member));
-            self.wanted.set(member, place);
         }
     }
 

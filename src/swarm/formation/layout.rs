@@ -122,7 +122,9 @@ fn of_body(swarm: &Swarm, scene: &Scene) -> Result<Formation, SceneError> {
             motion: None,
         });
     }
-    let mut formation = of_particles(swarm, Plan::new(&led)?.setup, false);
+    let mut setup = Plan::new(&led)?.setup;
+    setup.update.damping = default_damping(setup.flock.rule);
+    let mut formation = of_particles(swarm, setup, false);
     formation.names = names;
     formation.let_lead(members_led);
     Ok(formation)

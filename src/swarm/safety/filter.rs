@@ -74,6 +74,9 @@ pub struct Stray {
 #[derive(Clone)]
 pub struct Filter {
     pub(super) limits: Limits,
+    /// The highest speed that any member may go at \[m/s\]: a limit that is lowered here is not lowered by the other nodes that move
+    /// members, nor for the time before.
+    fastest: f64,
     pub(super) radii: Vec<f64>,
     pub(super) largest_radius: f64,
     pub(super) obstacles: Obstacles,
@@ -132,6 +135,7 @@ impl Filter {
             detours: vec![Detour::default(); radii.len()],
             sent: vec![[f64::NAN; 2]; radii.len()].into_iter().collect(),
             sent_before: vec![[f64::NAN; 2]; radii.len()].into_iter().collect(),
+            fastest: limits.speed,
             limits,
             radii,
             obstacles,
@@ -153,6 +157,7 @@ impl Filter {
     pub fn set_limits(&mut self, limits: Limits) -> Result<(), SafetyError> {
         limits.check()?;
         self.fence = limits.geofence.as_deref().map(Obstacles::fence).transpose()?.unwrap_or_default();
+        self.fastest = self.fastest.max(limits.speed);
         self.limits = limits;
         Ok(())
     }
@@ -321,7 +326,7 @@ impl Filter {
     /// Largest distance of a member from its pose \[m\] by its age.
     pub(super) fn drift(&self, seen: &Seen, member: usize) -> f64 {
         let age = seen.ages[member];
-        if self.limits.speed.is_finite() && age > 0.0 { self.limits.speed * age } else { 0.0 }
+        if self.fastest.is_finite() && age > 0.0 { self.fastest * age } else { 0.0 }
     }
 
     /// The way on which a member is or comes to rest \[m\], and how far it may be from that \[m\].

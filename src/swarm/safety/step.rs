@@ -4,6 +4,7 @@ use super::cell::{HalfPlane, length, shortened};
 use super::deadlock::Tick;
 use super::filter::{Filter, Flags, Seen, places};
 use super::ways::Border;
+use crate::flock::vectors::distance;
 use crate::geometry::point::{dot, minus};
 
 /// A member's wanted way at this tick, and its reach.
@@ -127,6 +128,22 @@ impl Filter {
         let velocity = [0, 1].map(|k| (last[k] - before[k]) / period);
         let from = [last[0] - here[0], last[1] - here[1]];
         Some(Motion { from, velocity: shortened(velocity, self.limits.speed) })
+    }
+
+    /// The place at which a member stands as soon as it can \[m, world frame\]: never behind it, as the place of a late pose is.
+    pub(crate) fn stopping_place(&self, seen: &Seen, period: f64, member: usize) -> [f64; 2] {
+        if self.brakes(seen) {
+            return self.resting_place(seen, period, member);
+        }
+        let (here, last) = (seen.present.get(member), self.sent.get(member));
+        // One that was not sent anywhere near, or is seen where it is, stops there.
+        let age = seen.ages[member].max(0.0);
+        let is_on_its_way = distance(here, last) <= self.limits.speed * (period + age);
+        let from = if is_on_its_way && self.is_inexact(seen, period, member) { last } else { here };
+        let way = self.motion(seen, period, member).map_or([0.0; 2], |Motion { velocity, .. }| {
+            velocity.map(|v| v * length(velocity) / (2.0 * self.limits.acceleration))
+        });
+        [from[0] + way[0], from[1] + way[1]]
     }
 
     /// The member's velocity, where there is one and a limit that asks for it.

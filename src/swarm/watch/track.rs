@@ -73,6 +73,9 @@ const NOISE: f64 = 9.0;
 /// Bound on the error of a velocity behind poses that are inexact, in units of what the acceleration changes between two \[1\].
 const INEXACT: f64 = 4.0;
 
+/// Part of a period within which two times are one \[1\].
+const TOGETHER: f64 = 1e-6;
+
 /// Speed below which a robot is at rest, in units of what it takes up in a period \[1\].
 const AT_REST: f64 = 1e-12;
 
@@ -93,7 +96,7 @@ impl Track {
     /// Takes in a pose that is believed; without it the robot goes on as its model does.
     pub fn correct(&mut self, pose: &Pose, dynamics: &DoubleIntegrator, period: f64, deviation: f64) {
         let Some(since) = self.stamp.filter(|&since| since < pose.stamp) else {
-            return self.restart(pose);
+            return self.restart(pose, period);
         };
         let expected = self.run(self.robot, pose.stamp, dynamics, period, &mut |_| {});
         let surprise = [0, 1].map(|k| pose.position[k] - expected.position[k]);
@@ -101,7 +104,7 @@ impl Track {
         let off = distance(pose.position, expected.position);
         // Farther than it can have gone: the pose gives no information on its velocity.
         if off > 2.0 * dynamics.speed * time + 12.0 * deviation {
-            return self.restart(pose);
+            return self.restart(pose, period);
         }
         let is_surprise = off > SURPRISE * dynamics.acceleration * time * time + NOISE * deviation;
         let led = dynamics.acceleration * time;
@@ -124,14 +127,14 @@ impl Track {
         if speed > fastest {
             self.robot.velocity = self.robot.velocity.map(|v| v * fastest / speed);
         }
-        self.begin(pose);
+        self.begin(pose, period);
     }
 
     /// Takes in a pose that is believed, of a robot that takes no time to brake.
-    pub fn note(&mut self, pose: &Pose) {
+    pub fn note(&mut self, pose: &Pose, period: f64) {
         match self.stamp {
-            Some(since) if since < pose.stamp => self.begin(pose),
-            _ => self.restart(pose),
+            Some(since) if since < pose.stamp => self.begin(pose, period),
+            _ => self.restart(pose, period),
         }
     }
 
@@ -209,20 +212,22 @@ impl Track {
         found
     }
 
-    fn restart(&mut self, pose: &Pose) {
+    fn restart(&mut self, pose: &Pose, period: f64) {
         // The clock has been set back: times of before mean nothing.
         if self.stamp.is_some_and(|stamp| stamp > pose.stamp) {
             self.sent.clear();
         }
         (self.robot, self.doubt, self.is_new) = (Robot::at(pose.position, pose.yaw), 0.0, true);
-        self.begin(pose);
+        self.begin(pose, period);
     }
 
     /// Takes a pose for the last one.
-    fn begin(&mut self, pose: &Pose) {
+    fn begin(&mut self, pose: &Pose, period: f64) {
         (self.stamp, self.seen) = (Some(pose.stamp), pose.position);
-        // The target that holds at that time is still needed, and the one before, which may still be on its way.
-        while self.sent.get(2).is_some_and(|&(from, _)| from <= pose.stamp) {
+        // A command takes no more than a period to reach the robot, which then goes to the target of that one and no more to the one
+        // before: its last place is where it has come on the way there.
+        let is_heard = |from: f64| from + period * (1.0 - TOGETHER) <= pose.stamp;
+        while self.sent.get(1).is_some_and(|&(from, _)| is_heard(from)) {
             self.sent.pop_front();
         }
     }
