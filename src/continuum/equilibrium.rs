@@ -233,7 +233,7 @@ fn of_plan_after(scene: &Scene, plan: &Plan, steps: f64) -> Result<System, Scene
 const NEAR_A_HALF: f64 = 0.49;
 
 /// Whether the body's material, or that of one of its inclusions, hardly changes its volume.
-fn is_nearly_incompressible(scene: &Scene) -> bool {
+pub(super) fn is_nearly_incompressible(scene: &Scene) -> bool {
     let inclusions = scene.inclusions.iter().map(|part| &part.material);
     let mut all = scene.material.iter().chain(inclusions);
     all.any(|part| part.poisson_in_plane_strain().is_some_and(|poisson| poisson > NEAR_A_HALF))

@@ -4,7 +4,9 @@
 //! Arrays of the plan are counted; what solvers and measurements take beside them was measured on square and hexagonal
 //! bodies of 100,000 to 1,200,000 particles, aligned and fitted, and is the same for each particle.
 
+use super::equilibrium::is_nearly_incompressible;
 use super::plan::Plan;
+use crate::engine::setup::Setup;
 use crate::flock::body::Cut;
 use crate::flock::law::Weights;
 use crate::flock::neighbourhood::Neighbourhood;
@@ -15,7 +17,7 @@ use crate::geometry::outline::{Outline, Place};
 use crate::scene::{BodySource, Scene, Weights as FixedWeights};
 use crate::solve::corotated::{self, is_corotated};
 use crate::solve::equilibrium::{
-    Choice, DIRECT_UP_TO, FACTORISED_UP_TO, Precision, Solver, UNSYMMETRIC_UP_TO,
+    Choice, DIRECT_UP_TO, FACTORISED_UP_TO, INCOMPRESSIBLE_UP_TO, Precision, Solver, UNSYMMETRIC_UP_TO,
 };
 
 /// Fewest bytes that a run of a scene takes, known before anything is laid out; 0 where its layout is refused anyway.
@@ -94,19 +96,53 @@ fn lists_of_the_sweep(plan: &Plan) -> usize {
 pub fn solving(scene: &Scene, plan: &Plan) -> usize {
     /// Vectors of conjugate gradients, and of all levels of multigrid.
     const BY_ITERATION: f64 = 118.0;
-    /// The matrix of a body that turns, which differs from row to row, and its factor.
-    const COROTATED: f64 = 4_600.0;
-    let Some(asked) = &scene.equilibrium else { return 0 };
-    let count = if iterates_in_parts(scene, plan) { plan.count() } else { plan.setup.body.total() } as f64;
-    let is_direct = match asked.request.solver {
-        Choice::This(solver) => solver == Solver::Direct,
-        Choice::Auto => plan.count() <= UNSYMMETRIC_UP_TO && is_one_sided(plan),
-    };
-    match (is_corotated(&plan.setup.flock), is_direct) {
-        (true, _) => (COROTATED * count) as usize,
-        (false, true) => factor(count),
-        (false, false) => (BY_ITERATION * count) as usize,
+    /// The matrix of a body that turns, which differs from row to row, and its factor; the latter where rows are wide.
+    const COROTATED: f64 = 2_000.0;
+    const COROTATED_FACTOR: [f64; 2] = [2_600.0, 6_300.0];
+    if scene.equilibrium.is_none() {
+        return 0;
     }
+    let count = if iterates_in_parts(scene, plan) { plan.count() } else { plan.setup.body.total() } as f64;
+    let of_each = match (is_corotated(&plan.setup.flock), is_factorised(scene, plan)) {
+        (true, is_factorised) => {
+            let factor =
+                if is_factorised { between(COROTATED_FACTOR, share_of_wide_rows(plan)) } else { 0.0 };
+            COROTATED + factor
+        }
+        (false, true) => return factor(plan, count),
+        (false, false) => BY_ITERATION,
+    };
+    (of_each * count) as usize
+}
+
+/// Whether the equilibrium is found by a factorisation, as far as is known before.
+fn is_factorised(scene: &Scene, plan: &Plan) -> bool {
+    let Some(asked) = &scene.equilibrium else { return false };
+    let total = plan.setup.body.total();
+    match asked.request.solver {
+        Choice::This(solver) => solver == Solver::Direct,
+        Choice::Auto if is_corotated(&plan.setup.flock) => total <= corotated::DIRECT_UP_TO,
+        Choice::Auto if is_one_sided(plan) => plan.count() <= UNSYMMETRIC_UP_TO,
+        Choice::Auto => {
+            let most = if is_nearly_incompressible(scene) { INCOMPRESSIBLE_UP_TO } else { DIRECT_UP_TO };
+            asked.request.precision == Precision::F64 && followers(plan) <= most
+        }
+    }
+}
+
+fn followers(plan: &Plan) -> usize {
+    plan.setup.roles.iter().filter(|&&role| role == Role::Follower).count()
+}
+
+/// The part of the cells whose dilatation is averaged with that of others, so that particles feel each other across two cells \[1\].
+fn share_of_wide_rows(plan: &Plan) -> f64 {
+    let Setup { cells: Some(cells), elastic: Some(elastic), .. } = &plan.setup else { return 0.0 };
+    let is_wide = |cell: &usize| cells.material_of(*cell, elastic).averaged_dilatation().is_some();
+    (0..cells.count()).filter(is_wide).count() as f64 / cells.count().max(1) as f64
+}
+
+fn between([low, high]: [f64; 2], share: f64) -> f64 {
+    low + share * (high - low)
 }
 
 /// Bytes that equilibria on the way take beside the last one: the plan, of which the engine has a copy but for the places, forces and
@@ -134,20 +170,21 @@ pub(super) fn iterates_in_parts(scene: &Scene, plan: &Plan) -> bool {
 /// it does not iterate, or would not fall back. Few bodies need it: [`solving`] leaves it out.
 pub fn fallback(scene: &Scene, plan: &Plan) -> Option<usize> {
     let request = &scene.equilibrium.as_ref()?.request;
-    let followers = plan.setup.roles.iter().filter(|&&role| role == Role::Follower).count();
     let falls_back = request.solver == Choice::Auto
         && request.precision == Precision::F64
-        && (DIRECT_UP_TO + 1..=FACTORISED_UP_TO).contains(&followers)
+        && followers(plan) <= FACTORISED_UP_TO
         && !is_corotated(&plan.setup.flock)
-        && !is_one_sided(plan);
-    falls_back.then(|| factor(plan.count() as f64))
+        && !is_factorised(scene, plan);
+    falls_back.then(|| factor(plan, plan.count() as f64))
 }
 
-/// Bytes of a factor.
-fn factor(count: f64) -> usize {
-    /// Of each particle, by each doubling of the body from 2^11 particles on.
+/// Bytes of a factor of so many particles.
+fn factor(plan: &Plan, count: f64) -> usize {
+    /// Of each particle, by each doubling of the body from 2^11 particles on; and where rows are wide, with what it has before.
     const EACH: f64 = 530.0;
-    (EACH * (count.log2() - 11.0).max(1.0) * count) as usize
+    const WIDE: [f64; 2] = [3_680.0, 658.0];
+    let doublings = (count.log2() - 11.0).max(1.0);
+    (between([EACH * doublings, WIDE[0] + WIDE[1] * doublings], share_of_wide_rows(plan)) * count) as usize
 }
 
 /// Whether a particle sees another that does not see it; a material's never do.

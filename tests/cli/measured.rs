@@ -188,6 +188,9 @@ fn a_solve_that_rounding_ends_names_stiffnesses_that_are_far_apart() {
     let (_, said) = run(&[&fine, stiff, PULL, "[equilibrium]\n"], &["--figures", "none"], 1);
     assert!(said.contains("short of its tolerance"), "{said}");
     assert!(said.contains("the stiffest material is 1e12 times as stiff"), "{said}");
+    // Listed again, it covers itself.
+    let (_, said) = run(&[&fine, stiff, stiff, PULL, "[equilibrium]\n"], &["--figures", "none"], 2);
+    assert!(said.contains("inclusions[0]") && said.contains("later entries cover all of it"), "{said}");
 }
 
 #[test]

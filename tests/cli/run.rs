@@ -169,6 +169,11 @@ fn a_solved_scene_reports_its_solver_and_how_it_came_to_rest() {
     let asked = "equilibrium={solver=\"jacobi\",most_iterations=3}";
     failed(&[&too_few[..], &[asked]].concat(), folder.path());
     assert_eq!(json_in(&folder.path().join("there/summary.json"))["stop_reason"], "unsettled");
+    // Of a body that turns it is the cap that is named, and not a load at which it would buckle.
+    let asked = "equilibrium={solver=\"conjugate-gradients\",most_iterations=3}";
+    let too_few =
+        ["run", "elastica", "--out", "turned", "--set", asked, "--set", "load_steps={increments=1}"];
+    refused_in(&too_few, folder.path(), &["no further than most_iterations", "raise it"]);
 }
 
 #[test]
