@@ -140,7 +140,12 @@ impl Filter {
         let age = seen.ages[member].max(0.0);
         let is_on_its_way = distance(here, last) <= self.limits.speed * (period + age);
         let from = if is_on_its_way && self.is_inexact(seen, period, member) { last } else { here };
+        // No faster than it was sent: one that is pushed, or carried away, has no way to brake.
+        let before = self.sent_before.get(member);
+        let sent = length(minus(last, before)) / period;
+        let most = if is_on_its_way && sent.is_finite() { sent.min(self.limits.speed) } else { 0.0 };
         let way = self.motion(seen, period, member).map_or([0.0; 2], |Motion { velocity, .. }| {
+            let velocity = shortened(velocity, most);
             velocity.map(|v| v * length(velocity) / (2.0 * self.limits.acceleration))
         });
         [from[0] + way[0], from[1] + way[1]]
