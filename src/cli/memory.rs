@@ -23,9 +23,10 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs) -> usize {
     running.max(own("VmHWM:").unwrap_or(0) as usize)
 }
 
-/// Bytes that one of so many ranks, with this part of a body, takes at its largest, with what the first one keeps for these outputs.
-pub fn of_part(scene: &Scene, plan: &Plan, ranks: usize, outputs: Outputs) -> usize {
-    flockform::export::memory::of_part(scene, plan, (ranks, outputs), code())
+/// Bytes that one of so many ranks, with this part of a body, takes at its largest for these outputs, if it is the one that `writes` or
+/// another.
+pub fn of_part(scene: &Scene, plan: &Plan, ranks: usize, (outputs, writes): (Outputs, bool)) -> usize {
+    flockform::export::memory::of_part(scene, plan, (ranks, outputs, writes), code())
 }
 
 /// Bytes of the program's code so far; a guess where the system does not say.

@@ -53,7 +53,7 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
                 let are_drawn = is_raster(parts.total());
                 let figures = if are_drawn { Formats::All } else { Formats::None };
                 let outputs = [Outputs { figures, report: true }, Outputs::TABLES];
-                let bytes = outputs.map(|outputs| of_part(&scene, &parts.largest, count, outputs));
+                let bytes = outputs.map(|outputs| of_part(&scene, &parts.largest, count, (outputs, true)));
                 parts.facts(bytes, are_drawn)
             });
             if let (Some(facts), Err(too_large)) = (&of_parts, require(&scene, at_least(&scene))) {

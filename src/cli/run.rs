@@ -123,8 +123,12 @@ impl Prepared {
                 let scene = interruptible(scene);
                 let plan = Plan::of_counted_part(&scene, &parting, team)?;
                 let digest = digest_of_parts(&plan, team);
-                let bytes = memory::of_part(&scene, &plan, team.count(), arguments.outputs());
-                memory::require(&scene, (ranks::others_here() + 1) as f64 * bytes as f64)?;
+                let of_one = |writes: bool| {
+                    memory::of_part(&scene, &plan, team.count(), (arguments.outputs(), writes))
+                };
+                // One of those on this machine may be the first.
+                let bytes = of_one(true) + ranks::others_here() * of_one(false);
+                memory::require(&scene, bytes as f64)?;
                 left.as_mut().map_or(Ok(()), |left| left.fit(&scene, &plan, digest))?;
                 return Ok(Self { left, asked, scene, words: String::new(), plan, digest, is_parted: true });
             }
@@ -206,7 +210,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
         note!("caution: {caution}");
     }
     let undrawn = left.as_ref().map_or_else(Vec::new, |left| left.undrawn(&scene));
-    if arguments.outputs().draws() && !undrawn.is_empty() && !arguments.output.quiet {
+    if arguments.outputs().draws() && !undrawn.is_empty() && folder.is_some() && !arguments.output.quiet {
         note!(
             "caution: no figures were asked for until now: there are none of steps {}",
             undrawn.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
@@ -250,7 +254,8 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     let is_interrupted = outcome.reason == StopReason::Interrupted;
     let is_small = engine.body().total() <= QUICKLY_WRITTEN;
     let mut saving = is_interrupted.then(interrupt::saving);
-    let is_worth_keeping = is_interrupted || engine.any_of_parts(elapsed > WORTH_KEEPING);
+    let is_worth_keeping =
+        is_interrupted || (arguments.outputs().draws() && engine.any_of_parts(elapsed > WORTH_KEEPING));
     if is_worth_keeping && !engine.any_of_parts(recorder.failed()) {
         let _saving = interrupt::saving();
         let kept = recorder.kept(engine);

@@ -328,7 +328,8 @@ pub(super) fn cautions(
     let in_hollows = |is_steep: bool| {
         let is_one = |(i, patch): &(usize, &Patch)| {
             let steepness = steepness(patch.region);
-            (steepness > STEEP) == is_steep && patches.is_in_hollow(*i, patch, HOLLOW * steepness * steepness)
+            let radius = HOLLOW * if is_steep { steepness * steepness } else { 1.0 };
+            (steepness > STEEP) == is_steep && patches.is_in_hollow(*i, patch, radius)
         };
         count(known().filter(is_one).count())
     };
@@ -362,8 +363,8 @@ pub(super) fn cautions(
     if steep > 0 {
         let steepest = (0..=cells.inclusions.len() as u32).map(steepness).fold(1.0, f64::max);
         cautions.push(format!(
-            "stress is off by a tenth or more, to either side, at {steep} particles along hollows of a material with fibres, where it \
-             changes up to {steepest:.1} times as fast as without them; use a spacing of at most a {:.0}th of their radius",
+            "stress is off by a tenth or more, either way, at {steep} particles along hollows of a material with fibres, where it \
+             changes up to {steepest:.1} times as fast as without them; use a spacing of at most 1/{:.0} of their radius",
             8.0 * steepest * steepest
         ));
     }

@@ -125,7 +125,9 @@ fn is_factorised(scene: &Scene, plan: &Plan) -> bool {
         Choice::Auto if is_one_sided(plan) => plan.count() <= UNSYMMETRIC_UP_TO,
         Choice::Auto => {
             let most = if is_nearly_incompressible(scene) { INCOMPRESSIBLE_UP_TO } else { DIRECT_UP_TO };
-            asked.request.precision == Precision::F64 && followers(plan) <= most
+            // Of a part it is not known how many of the others follow.
+            let followers = if plan.setup.body.part.is_some() { total } else { followers(plan) };
+            asked.request.precision == Precision::F64 && followers <= most
         }
     }
 }
@@ -162,7 +164,7 @@ pub(super) fn iterates_in_parts(scene: &Scene, plan: &Plan) -> bool {
         Choice::This(solver) => solver.is_shared(),
         Choice::Auto if is_corotated(&plan.setup.flock) => plan.setup.body.total() > corotated::DIRECT_UP_TO,
         // Neighbours hardly feel each other alike.
-        Choice::Auto => scene.weights != Some(FixedWeights::Solved),
+        Choice::Auto => scene.weights != Some(FixedWeights::Solved) && !is_factorised(scene, plan),
     })
 }
 

@@ -17,6 +17,9 @@ const RUNNING: usize = 15 << 18;
 /// Bytes of a particle in a [`Snapshot`](crate::continuum::record::Snapshot): position, role and energies.
 const SNAPSHOT: usize = 16 + 1 + 2 * 8;
 
+/// Bytes of the figures of a step that are drawn when it comes: measured, a tenth of a MB for each at most.
+const DRAWN: usize = 1 << 18;
+
 /// Bytes of what a figure shows of a cell: three components, or the von Mises stress and where the corners stand.
 const SHOWN: usize = 3 * 8;
 
@@ -51,18 +54,19 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
     let is_drawn_at_once = draws && is_raster(plan.count());
     let kept = if is_drawn_at_once { [0; 2] } else { [drawn_before, usize::from(draws)] };
     let [snapshots, last] = kept.map(|each| each * SNAPSHOT * plan.count());
+    let drawn = if is_drawn_at_once { DRAWN * (drawn_before + 1) } else { 0 };
     let Packed { values, frames, packing, text } =
         if outputs.report { packed(scene, plan) } else { Packed::default() };
-    let at_once = if is_drawn_at_once { drawing_at_once(plan) } else { 0 };
+    let while_stepping = if is_drawn_at_once { drawing_at_once(plan) } else { 0 };
     let stepping = match is_solved_at_once {
-        true => solving(scene, plan).max(at_once),
-        false => values + frames[0] + taken_back(scene, plan) + solving(scene, plan).max(at_once),
+        true => solving(scene, plan).max(while_stepping),
+        false => values + frames[0] + taken_back(scene, plan) + solving(scene, plan).max(while_stepping),
     };
     let packing = last + values.max(packing) + frames[1];
     let tables = last + text + measured(plan);
     // There are two figures of stresses.
-    let at_once = if is_drawn_at_once { 0 } else { rayon::current_num_threads().min(2) };
-    let stresses = at_once * stresses(plan);
+    let painters = if is_drawn_at_once { 0 } else { rayon::current_num_threads().min(2) };
+    let stresses = painters * stresses(plan);
     let drawing = match draws {
         true => last + text + pictures(scene, plan, drawn_before + 1) + stresses,
         false => 0,
@@ -73,7 +77,7 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
         beside => beside + solving(scene, plan).max(measured(plan)) + values + frames[0],
     };
     let most = [stepping, increments, packing, tables, drawing].into_iter().max().unwrap_or(0);
-    program + RUNNING + stepped(plan) + snapshots + most
+    program + RUNNING + stepped(plan) + snapshots + drawn + most
 }
 
 /// Bytes of what a figure needs of stresses: those of the cells, and what it shows of them.
@@ -93,8 +97,13 @@ fn taken_back(scene: &Scene, plan: &Plan) -> usize {
 }
 
 /// Bytes that one of so many ranks with a part of a body takes at its largest, by a program whose own code takes so many: tables
-/// are written row by row. The first rank keeps what a report shows, and turns figures into pixels.
-pub fn of_part(scene: &Scene, plan: &Plan, (ranks, outputs): (usize, Outputs), program: usize) -> usize {
+/// are written row by row. The first rank, which `writes`, keeps what a report shows, and turns figures into pixels.
+pub fn of_part(
+    scene: &Scene,
+    plan: &Plan,
+    (ranks, outputs, writes): (usize, Outputs, bool),
+    program: usize,
+) -> usize {
     /// Memory of MPI, and what it shares with each rank on a machine; measured with Open MPI 4.1.
     const MPI: [usize; 2] = [4 << 20, 3 << 19];
     /// Ranks that share a machine's memory, as far as it is known beforehand.
@@ -104,13 +113,15 @@ pub fn of_part(scene: &Scene, plan: &Plan, (ranks, outputs): (usize, Outputs), p
     let [each, of_rank] = MPI;
     let halo = plan.setup.body.part.as_ref().map_or(0, |part| part.exact.len() - part.owned.len());
     let Packed { values, frames, packing, .. } =
-        if outputs.report { packed(scene, plan) } else { Packed::default() };
+        if outputs.report && writes { packed(scene, plan) } else { Packed::default() };
     let stepping = ON_THE_WAY * halo + taken_back(scene, plan);
-    let [at_once, drawing] = match outputs.draws() {
-        true => [drawing_at_once(plan), pictures(scene, plan, scene.record.figures.len() + 1)],
-        false => [0; 2],
+    let moments = scene.record.figures.len() + 1;
+    let while_stepping = if outputs.draws() { drawing_at_once(plan) } else { 0 };
+    let drawing = match outputs.draws() && writes {
+        true => DRAWN * moments + pictures(scene, plan, moments),
+        false => 0,
     };
-    let most = measured(plan).max(stepping).max(solving(scene, plan)).max(at_once);
+    let most = measured(plan).max(stepping).max(solving(scene, plan)).max(while_stepping);
     let shown = values.max(packing).max(drawing) + frames[0];
     program
         + RUNNING

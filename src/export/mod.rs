@@ -114,7 +114,7 @@ pub struct Results<'a> {
     pub outcome: &'a Outcome,
     /// The configurations to draw.
     pub snapshots: &'a [Snapshot],
-    /// Those that are drawn already ([`Drawn::of`]).
+    /// Figures that are drawn already ([`Drawn::of`]).
     pub drawn: &'a [Drawn],
     /// Histories of the probed particles.
     pub probes: &'a [ProbeSeries],

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use flockform::continuum::plan::Plan;
 use flockform::continuum::record::{LoadStep, ProbeSeries, Snapshot};
-use flockform::continuum::run::Outcome;
+use flockform::continuum::run::{Outcome, StopReason};
 use flockform::engine::Engine;
 use flockform::export::figures::is_raster;
 use flockform::export::memory::Outputs;
@@ -197,7 +197,9 @@ impl<'a> Recorder<'a> {
         let (step, every) = (engine.step(), self.scene.record.vtk_every);
         self.receive_probes(engine);
         let last = self.snapshots.last().map(|last| last.step).or(self.drawn.last().map(|last| last.step));
-        if last != Some(step) {
+        // Figures of a run that is broken off are not written, and those of a large body take their time.
+        let is_in_vain = outcome.reason == StopReason::Interrupted && is_raster(engine.body().total());
+        if last != Some(step) && !is_in_vain {
             self.draw(engine);
         }
         if load_every(self.scene).is_some() && self.load_steps.last().is_none_or(|last| last.step != step) {
@@ -206,11 +208,10 @@ impl<'a> Recorder<'a> {
         if every > 0 && !self.is_frame(step) && !engine.any_of_parts(self.failed()) {
             self.write_frame(engine);
         }
-        if let Some(failure) = self.failure {
-            return Err(failure);
-        }
-        if let Some(frames) = self.frames.take() {
-            frames.finish()?;
+        if self.failure.is_none()
+            && let Some(frames) = self.frames.take()
+        {
+            self.failure = frames.finish().err();
         }
         let start = Instant::now();
         if self.keeps_frames() {
@@ -224,9 +225,11 @@ impl<'a> Recorder<'a> {
         let animation = self.animation.as_mut().filter(|_| is_written);
         let stage = animation.map(|animation| animation.stage(self.scene, outcome));
         let writing = self.writing + start.elapsed();
-        let Self { snapshots, drawn, probes, load_steps, animation, films, .. } = self;
+        let Self { snapshots, drawn, probes, load_steps, animation, films, failure, .. } = self;
         let animation = animation.filter(|_| films);
-        Ok(Records { snapshots, drawn, probes, load_steps, stage, animation, writing })
+        // The others take the last frame of the report together with a rank that could not write its own.
+        let records = Records { snapshots, drawn, probes, load_steps, stage, animation, writing };
+        failure.map_or(Ok(records), Err)
     }
 }
 

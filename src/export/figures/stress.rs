@@ -14,14 +14,15 @@ use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 use crate::material::stress::StressState;
 
-/// More cells than this are drawn as a raster.
+/// More cells than this, or more particles than are drawn as dots, are drawn as a raster.
 const MOST_SHOWN: usize = 60_000;
 /// Stress below this part of the largest is rounding.
 const NOISE: f64 = 1e-9;
 
 /// Every whole cell in the colour of its von Mises stress, in its place or, where displacements could not be seen or
 /// the body would be lost beside them, in the place of a displacement so many times as large, which the heading says.
-/// Along a fitted outline stress is known at the particles: there contours reach the peak at the edge, which no cell has.
+/// Along a fitted outline stress is known at the particles: there contours reach the peak at the edge, which no cell has. Bodies of
+/// very many cells or particles are drawn as squares of their cells' largest stress.
 pub fn stress(
     subject: &Subject<'_>,
     snapshot: &Snapshot,
