@@ -64,7 +64,7 @@ fn of_pairs(own: ([f64; 2], [f64; 2]), pairs: impl Iterator<Item = ([f64; 2], [f
     let [xx, yy, xy] = then_then;
     let determinant = xx * yy - xy * xy;
     // Neighbours on a line leave one direction unknown, also where rounding has moved them off it.
-    if determinant.is_nan() || determinant <= 1e-9 * xx * yy || xx.min(yy) <= 1e-18 * xx.max(yy) {
+    if determinant.is_nan() || determinant <= 1e-13 * xx.max(yy) * xx.max(yy) {
         return None;
     }
     let inverse = [[yy / determinant, -xy / determinant], [-xy / determinant, xx / determinant]];

@@ -125,7 +125,7 @@ impl Monitor {
         let posture = formation.posture(formation.middle(), self.control.program_time());
         let mode = match self.control.mode() {
             Mode::Running => "running",
-            Mode::EmergencyStopped => "emergency stop: every robot holds its place",
+            Mode::EmergencyStopped => "emergency stop: every robot comes to rest and holds its place",
             Mode::Inactive => "inactive: no targets are sent",
         };
         json!({

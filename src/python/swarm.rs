@@ -249,7 +249,7 @@ impl Swarm {
         Ok(())
     }
 
-    /// Makes every robot hold its place from the next tick on, until resume().
+    /// Brings every robot to rest from the next tick on, and holds it there until resume().
     fn emergency_stop(&mut self) {
         self.control.emergency_stop();
     }

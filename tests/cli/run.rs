@@ -327,7 +327,12 @@ fn regions_roles_and_probes_that_miss_the_body_are_refused() {
         &["no particle 9999", "1 to 144"],
     );
     refused_with("tension", &["roles[0].region={kind=\"ids\",ids=[1]}"], &["belongs to the frame"]);
-    refused_with("tension", &["record.probes=[0]"], &["record.probes[0]", "no particle 0"]);
+    refused_with("tension", &["record.probes=[0]"], &["record.probes[0]", "at least 1"]);
+    refused_with(
+        "tension",
+        &["record.probes=[1,99999]"],
+        &["record.probes[1]", "no particle 99999", "help:"],
+    );
     refused_with("tension", &["roles[0].role=leader"], &["a leader needs a motion"]);
     refused_with(
         "tension",

@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use flockform::flock::vectors::{Vectors, distance};
 use flockform::scene::bundled::SWARMS;
 use flockform::scene::swarm::Swarm;
+use flockform::swarm::control::Control;
 use flockform::swarm::flight::{Flight, FlightReport, fly};
 use flockform::swarm::plan::SwarmPlan;
 
@@ -388,4 +389,16 @@ fn a_broken_bound_names_the_robots_the_time_and_the_place() {
     let html = std::fs::read_to_string(page).expect("the page");
     let button = format!("<button type=\"button\" data-seek=\"{}\">", moment.time);
     assert!(html.contains(&button), "a click leads to the moment");
+}
+
+/// A step that is too long for its waves makes a material diverge.
+#[test]
+fn a_lattice_of_robots_takes_the_steps_that_its_rule_can_bear() {
+    for (rule, most) in [("barycentre", 1.0), ("distance", 0.5), ("material", 0.95)] {
+        let mean = format!("rule={{mean={{kind=\"{rule}\"}}}}");
+        let elastic = "material={kind=\"isotropic\",young=1.0,poisson=0.3}";
+        let sets = if rule == "material" { vec![&mean[..], elastic] } else { vec![&mean[..]] };
+        let damping = Control::new(&load_swarm("square", &sets)).expect("laid out").damping();
+        assert!(damping <= most && damping > 0.4, "{rule}: {damping}");
+    }
 }

@@ -314,3 +314,28 @@ fn robots_come_to_rest_in_an_emergency_stop_and_do_not_go_back() {
         );
     }
 }
+
+/// Without limits the last target may be anywhere.
+#[test]
+fn a_robot_without_a_speed_limit_is_not_sent_on_in_an_emergency_stop() {
+    let mut control =
+        Control::new(&circle_with("ideal\"", &["limits={clearance=0.1}".to_owned()])).expect("laid out");
+    assert!(control.place_leader(0, [40.0, 0.0]));
+    let start = control.formation().places.get(0);
+    for tick in 0..20 {
+        let (now, stamp) = (tick as f64 * PERIOD, (tick as f64 - 4.0) * PERIOD);
+        for k in 0..ROBOTS {
+            // It goes at a metre a second, whatever it is asked for.
+            let way = if k == 0 { stamp.max(0.0) } else { 0.0 };
+            let [x, y] = control.formation().places.get(k);
+            let pose = Pose { position: [x + way, y], yaw: 0.0, stamp, frame_is_right: true };
+            control.receive(k, pose, now).expect("a pose");
+        }
+        if tick == 15 {
+            control.emergency_stop();
+        }
+        control.tick(now);
+    }
+    let target = control.target(0).expect("known");
+    assert!(target[0] <= start[0] + 1.5, "{target:?}");
+}

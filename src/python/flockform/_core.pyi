@@ -371,7 +371,7 @@ class Swarm:
         """Moves all leaders by a manoeuvre of the swarm file from the next tick on."""
 
     def emergency_stop(self) -> None:
-        """Makes every robot hold its place from the next tick on, until resume()."""
+        """Brings every robot to rest from the next tick on, and holds it there until resume()."""
 
     def resume(self) -> bool:
         """Lifts an emergency stop; False if there is none."""

@@ -65,7 +65,7 @@ impl Commanded<'_> {
             NodeCommand::EmergencyStop => {
                 self.control.emergency_stop();
                 self.events.push((LoopEvent::EMERGENCY_STOP, String::new(), Vec::new()));
-                Ok("every robot holds its place until ~/resume".to_owned())
+                Ok("every robot comes to rest, and holds its place until ~/resume".to_owned())
             }
             NodeCommand::Resume if self.control.resume() => {
                 self.events.push((LoopEvent::RESUME, String::new(), Vec::new()));

@@ -4,7 +4,7 @@ use crate::messages::geometry_msgs::{Twist, TwistStamped, Vector3};
 use crate::messages::std_msgs::Header;
 use crate::ros::edge::{EdgeError, Node, Publisher, Quality};
 use crate::scene::swarm::raw::{RawModel, RawSwarm, RawVelocityType};
-use crate::swarm::control::Control;
+use crate::swarm::control::{Control, Mode};
 
 /// Velocities of one member, in its own axes (REP 103: x ahead, y to the left).
 pub struct Drive {
@@ -53,10 +53,15 @@ impl Drive {
 /// The velocity towards a member's target \[m\]. That of a member that takes time to brake is where it comes to rest, far
 /// ahead of what it goes in a period.
 fn towards(control: &Control, member: usize, target: [f64; 2], turn_rate: Option<f64>) -> Option<Twist> {
-    let (here, period) = (control.position(member)?, control.period());
+    let (here, period, limits) = (control.position(member)?, control.period(), control.limits());
+    // What stops at once stands wherever it is by now, which a late pose does not say.
+    let stands = !limits.brakes && limits.acceleration.is_infinite();
+    if control.mode() == Mode::EmergencyStopped && stands {
+        return None;
+    }
     let braking = control.next_velocity(member, target);
     let velocity = braking.unwrap_or([0, 1].map(|k| (target[k] - here[k]) / period));
-    Some(twist(velocity, control.yaw(member)?, period, control.limits().speed, turn_rate))
+    Some(twist(velocity, control.yaw(member)?, period, limits.speed, turn_rate))
 }
 
 /// How far a robot that turns while it drives may leave the straight way in a period \[m\].

@@ -72,16 +72,20 @@ pub(super) fn declare(
             .describe("highest acceleration of a robot [m/s^2]"),
         Declaration::new("clearance", limits.clearance)
             .range(limits.clearance..=limits.clearance.max(1000.0))
-            .checked("where the swarm file has one", {
-                let (keeps_apart, own) = (limits.keeps_apart, limits.clearance);
-                move |_, value| match keeps_apart || value.as_double() == Some(own) {
+            .checked("where the swarm file has one, or obstacles", {
+                let (has_effect, own) =
+                    (limits.keeps_apart || !control.filter().obstacles().is_empty(), limits.clearance);
+                move |_, value| match has_effect || value.as_double() == Some(own) {
                     true => Ok(()),
                     false => Err("robots are kept apart from each other only where the swarm file has limits.clearance: give it \
                                   there, 0.0 is enough"
                         .into()),
                 }
             })
-            .describe("free space kept between two robots, or a robot and an obstacle [m]"),
+            .describe(match limits.keeps_apart {
+                true => "free space kept between two robots, or a robot and an obstacle [m]",
+                false => "free space kept between a robot and an obstacle [m]",
+            }),
         Declaration::new("damping", control.damping())
             .range(0.0..=2.0)
             .describe("part of the way to its target that a follower goes in a sweep [1]"),

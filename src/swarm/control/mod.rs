@@ -227,6 +227,7 @@ impl Control {
     /// Changes the time between two ticks \[s\] from the next one on.
     pub fn set_period(&mut self, period: f64) {
         (self.run_before, self.run) = (self.program_time(), 0);
+        self.filter.stretch_period(period / self.period);
         self.period = period;
     }
 
@@ -319,7 +320,7 @@ impl Control {
         self.formation.begin(manoeuvre, now);
     }
 
-    /// Makes every member hold its place from the next tick on, until [`Control::resume`].
+    /// Brings every member to rest from the next tick on, and holds it there until [`Control::resume`].
     pub fn emergency_stop(&mut self) {
         if self.mode != Mode::EmergencyStopped {
             self.mode = Mode::EmergencyStopped;
@@ -463,6 +464,9 @@ impl Control {
             Mode::Running => {}
         }
         self.filter.apply(&seen, &self.wanted, self.period, &mut self.safe, &mut self.filtered);
+        if !active {
+            self.filter.forget();
+        }
         for member in 0..self.tracks.len() {
             let target = self.target(member);
             // Others may move it while the loop sends it nothing.

@@ -123,7 +123,7 @@ fn of_body(swarm: &Swarm, scene: &Scene) -> Result<Formation, SceneError> {
         });
     }
     let mut setup = Plan::new(&led)?.setup;
-    setup.update.damping = default_damping(setup.flock.rule);
+    setup.update.damping = setup.update.damping.min(default_damping(setup.flock.rule));
     let mut formation = of_particles(swarm, setup, false);
     formation.names = names;
     formation.let_lead(members_led);

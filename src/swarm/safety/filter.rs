@@ -162,6 +162,28 @@ impl Filter {
         Ok(())
     }
 
+    /// The highest speed that any member may go at \[m/s\].
+    pub(super) fn fastest(&self) -> f64 {
+        // Where the file has no limit that of this node is the best guess.
+        if self.fastest.is_finite() { self.fastest } else { self.limits.speed }
+    }
+
+    /// Forgets the targets of the ticks before: others may move the members.
+    pub(crate) fn forget(&mut self) {
+        for member in 0..self.radii.len() {
+            self.sent.set(member, [f64::NAN; 2]);
+            self.sent_before.set(member, [f64::NAN; 2]);
+        }
+    }
+
+    /// Keeps the velocities between the last targets where the period becomes so many times as long.
+    pub(crate) fn stretch_period(&mut self, ratio: f64) {
+        for member in 0..self.radii.len() {
+            let [last, before] = [&self.sent, &self.sent_before].map(|sent| sent.get(member));
+            self.sent_before.set(member, [0, 1].map(|k| last[k] + ratio * (before[k] - last[k])));
+        }
+    }
+
     /// Obstacles that members are kept away from.
     pub fn obstacles(&self) -> &Obstacles {
         &self.obstacles
@@ -325,8 +347,8 @@ impl Filter {
 
     /// Largest distance of a member from its pose \[m\] by its age.
     pub(super) fn drift(&self, seen: &Seen, member: usize) -> f64 {
-        let age = seen.ages[member];
-        if self.fastest.is_finite() && age > 0.0 { self.fastest * age } else { 0.0 }
+        let (age, fastest) = (seen.ages[member], self.fastest());
+        if fastest.is_finite() && age > 0.0 { fastest * age } else { 0.0 }
     }
 
     /// The way on which a member is or comes to rest \[m\], and how far it may be from that \[m\].

@@ -35,7 +35,7 @@
 //! true ages and a speed limit that all members keep. For obstacles the member's own age counts.
 //!
 //! A loop that sends the targets of both members knows more: each goes straight to one target after the other, at whatever
-//! pace, or stands, and so is in the convex hull `H` of its pose's place, the target that held at that time and the one before
+//! pace, or stands, and so is in the convex hull `H` of its pose's place, the target of the last command that it surely had by then
 //! ([`Stray::places`]), and those since. Where `H_i` and `H_j` are `s` apart, and farther than what the ages leave, the normal
 //! through their nearest points parts them, each member takes half of what is left, and its way from anywhere in its hull to a target on
 //! its side stays there. Discs of ages would have two robots that stand hold each other behind poses that are late enough; the hulls of

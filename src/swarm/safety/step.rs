@@ -130,15 +130,19 @@ impl Filter {
         Some(Motion { from, velocity: shortened(velocity, self.limits.speed) })
     }
 
-    /// The place at which a member stands as soon as it can \[m, world frame\]: never behind it, as the place of a late pose is.
+    /// The place at which a member stands as soon as it can \[m, world frame\]: where its targets are known not behind it, as the place
+    /// of a late pose is.
     pub(crate) fn stopping_place(&self, seen: &Seen, period: f64, member: usize) -> [f64; 2] {
-        if self.brakes(seen) {
-            return self.resting_place(seen, period, member);
-        }
         let (here, last) = (seen.present.get(member), self.sent.get(member));
-        // One that was not sent anywhere near, or is seen where it is, stops there.
+        if self.brakes(seen) {
+            // A velocity that is off moves the place where it seems to come to rest.
+            let (rest, (_, error)) = (self.resting_place(seen, period, member), self.promised(seen, member));
+            return if distance(last, rest) <= error { last } else { rest };
+        }
+        // One that was not sent anywhere near, as far as that is limited, or is seen where it is, stops there.
         let age = seen.ages[member].max(0.0);
-        let is_on_its_way = distance(here, last) <= self.limits.speed * (period + age);
+        let is_bounded = self.limits.speed.is_finite() || self.limits.acceleration.is_finite();
+        let is_on_its_way = is_bounded && distance(here, last) <= self.fastest() * (period + age);
         let from = if is_on_its_way && self.is_inexact(seen, period, member) { last } else { here };
         // No faster than it was sent: one that is pushed, or carried away, has no way to brake.
         let before = self.sent_before.get(member);

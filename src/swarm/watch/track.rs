@@ -224,10 +224,13 @@ impl Track {
     /// Takes a pose for the last one.
     fn begin(&mut self, pose: &Pose, period: f64) {
         (self.stamp, self.seen) = (Some(pose.stamp), pose.position);
-        // A command takes no more than a period to reach the robot, which then goes to the target of that one and no more to the one
-        // before: its last place is where it has come on the way there.
-        let is_heard = |from: f64| from + period * (1.0 - TOGETHER) <= pose.stamp;
-        while self.sent.get(1).is_some_and(|&(from, _)| is_heard(from)) {
+        // By then the robot has the command of a period ago, or of a longer one of before, and goes to its target, no more to the one
+        // before: where it has come on the way to that is the place of the pose.
+        let is_over = |by: f64| by <= pose.stamp;
+        let is_heard = |from: f64| is_over(from + period * (1.0 - TOGETHER));
+        while self.sent.get(1).is_some_and(|&(from, _)| is_heard(from))
+            && self.sent.get(2).is_none_or(|&(from, _)| is_over(from))
+        {
             self.sent.pop_front();
         }
     }

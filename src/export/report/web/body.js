@@ -240,7 +240,8 @@ export class Body {
       const [xx, yy, xy] = [sums[at], sums[at + 1], sums[at + 2]];
       const [ux, uy, vx, vy] = [sums[at + 3], sums[at + 4], sums[at + 5], sums[at + 6]];
       const det = xx * yy - xy * xy;
-      const known = det > 1e-9 * xx * yy && Math.min(xx, yy) > 1e-18 * Math.max(xx, yy);
+      const widest = Math.max(xx, yy);
+      const known = det > 1e-13 * widest * widest;
       gradients[4 * i] = known ? (ux * yy - uy * xy) / det : NaN;
       gradients[4 * i + 1] = known ? (uy * xx - ux * xy) / det : NaN;
       gradients[4 * i + 2] = known ? (vx * yy - vy * xy) / det : NaN;
