@@ -122,7 +122,8 @@ fn is_factorised(scene: &Scene, plan: &Plan) -> bool {
     match asked.request.solver {
         Choice::This(solver) => solver == Solver::Direct,
         Choice::Auto if is_corotated(&plan.setup.flock) => total <= corotated::DIRECT_UP_TO,
-        Choice::Auto if is_one_sided(plan) => plan.count() <= UNSYMMETRIC_UP_TO,
+        // In larger bodies nothing depends on which particles see each other, and it takes long to find out.
+        Choice::Auto if plan.count() <= UNSYMMETRIC_UP_TO && is_one_sided(plan) => true,
         Choice::Auto => {
             let most = if is_nearly_incompressible(scene) { INCOMPRESSIBLE_UP_TO } else { DIRECT_UP_TO };
             // Of a part it is not known how many of the others follow.
@@ -176,7 +177,8 @@ pub fn fallback(scene: &Scene, plan: &Plan) -> Option<usize> {
         && request.precision == Precision::F64
         && followers(plan) <= FACTORISED_UP_TO
         && !is_corotated(&plan.setup.flock)
-        && !is_factorised(scene, plan);
+        && !is_factorised(scene, plan)
+        && !is_one_sided(plan);
     falls_back.then(|| factor(plan, plan.count() as f64))
 }
 
