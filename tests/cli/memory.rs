@@ -68,7 +68,7 @@ fn plan_predicts_the_memory_of_a_run_within_a_tenth() {
         ("shear", &["body.shape.columns=500", "body.shape.rows=400", "stop.steps=10"]),
         ("notched-plate", &["lattice.spacing=0.1", "stop.steps=20"]),
         ("second-gradient", &["body.shape.columns=350", "body.shape.rows=350", "stop.steps=40"]),
-        ("fracture", &["lattice.a=1.2", "lattice.b=1.3", "fracture.distance=2", "stop.steps=20"]),
+        ("fracture", &["lattice.a=1", "lattice.b=1.1", "fracture.distance=2", "stop.steps=20"]),
         ("beam-loaded", &["lattice.spacing=0.03"]),
         ("beam-loaded", &["lattice.spacing=0.04", "load_steps.increments=2"]),
         ("beam-hexagonal", &["lattice.spacing=0.03"]),
