@@ -2,9 +2,10 @@
 
 use flockform::flock::vectors::distance;
 use flockform::scene::swarm::Swarm;
-use flockform::swarm::control::Control;
 use flockform::swarm::control::scope::NodeScope;
+use flockform::swarm::control::{Control, Mode};
 use flockform::swarm::robots::{DoubleIntegrator, Model, Robot};
+use flockform::swarm::safety::Limits;
 use flockform::swarm::watch::Pose;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -338,4 +339,74 @@ fn a_robot_without_a_speed_limit_is_not_sent_on_in_an_emergency_stop() {
     }
     let target = control.target(0).expect("known");
     assert!(target[0] <= start[0] + 1.5, "{target:?}");
+}
+
+/// The poses of the time before the change are of a faster robot.
+#[test]
+fn a_lower_speed_limit_sends_no_robot_back() {
+    for late in [0, 2, 5] {
+        let mut control = Control::new(&circle("integrator\"")).expect("laid out");
+        assert!(control.place_leader(0, [40.0, 0.0]));
+        let mut poses = vec![control.formation().places.get(0)];
+        for tick in 0..100_usize {
+            let now = tick as f64 * PERIOD;
+            if let Some(old) = tick.checked_sub(late) {
+                let stamp = old as f64 * PERIOD;
+                let pose = Pose { position: poses[old], yaw: 0.0, stamp, frame_is_right: true };
+                control.receive(0, pose, now).expect("a pose");
+                for k in 1..ROBOTS {
+                    let position = control.formation().places.get(k);
+                    control.receive(k, Pose { position, ..pose }, now).expect("a pose");
+                }
+            }
+            if tick == 50 {
+                let limits = Limits { speed: 0.2, ..control.limits().clone() };
+                control.set_limits(limits).expect("limits");
+            }
+            control.tick(now);
+            let (last, next) = (poses[tick], control.target(0).unwrap_or(poses[tick]));
+            let step = next[0] - last[0];
+            let most = if tick < 50 { 1.0 } else { 0.2 } * PERIOD;
+            let least = if tick < 50 { 0.0 } else { 0.99 * most };
+            assert!((least..=most + 1e-9).contains(&step), "{late} late: {step} m in tick {tick}");
+            poses.push(next);
+        }
+    }
+}
+
+/// While a loop is off others move its robots, in a stop as well.
+#[test]
+fn a_loop_that_is_switched_on_in_a_stop_holds_robots_where_they_are_by_then() {
+    let mut control = Control::new(&circle("integrator\"")).expect("laid out");
+    let places = control.formation().places.clone();
+    let mut tick = 0;
+    let mut run = |control: &mut Control, by: f64| {
+        let now = f64::from(tick) * PERIOD;
+        for k in 0..ROBOTS {
+            let [x, y] = places.get(k);
+            let pose = Pose { position: [x + by, y], yaw: 0.0, stamp: now, frame_is_right: true };
+            control.receive(k, pose, now).expect("a pose");
+        }
+        control.tick(now);
+        tick += 1;
+        control.target(0).map(|target| target[0] - places.get(0)[0])
+    };
+    assert_eq!(run(&mut control, 0.0), Some(0.0));
+    control.emergency_stop();
+    assert_eq!(run(&mut control, 0.0), Some(0.0));
+    control.set_active(false);
+    for k in 0..40 {
+        assert_eq!(run(&mut control, 0.05 * f64::from(k)), None, "it is off");
+    }
+    control.set_active(true);
+    assert_eq!(control.mode(), Mode::EmergencyStopped);
+    for _ in 0..20 {
+        let held = run(&mut control, 2.0).expect("it is on");
+        assert!((held - 2.0).abs() < 1e-12, "{held}");
+    }
+    control.set_active(false);
+    assert!(
+        control.resume() && control.mode() == Mode::Inactive,
+        "a stop that is lifted switches nothing on"
+    );
 }

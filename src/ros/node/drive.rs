@@ -1,4 +1,10 @@
 //! Velocities towards the targets, for robots that are driven so.
+//!
+//! A late pose is of a place that its robot has left, by the velocities that it was sent since. From there it would be sent on as if it
+//! had not: past its target, and to and fro. So each velocity is that from where those before have led (the predictor of
+//! O. J. M. Smith, "Closer control of loops with dead time", Chemical Engineering Progress 53(5), 1957).
+
+use std::collections::VecDeque;
 
 use crate::messages::geometry_msgs::{Twist, TwistStamped, Vector3};
 use crate::messages::std_msgs::Header;
@@ -9,8 +15,16 @@ use crate::swarm::control::{Control, Mode};
 /// Velocities of one member, in its own axes (REP 103: x ahead, y to the left).
 pub struct Drive {
     topic: Topic,
+    steering: Steering,
+}
+
+/// Velocities of one member towards its targets.
+#[derive(Default)]
+struct Steering {
     /// Highest turn rate of a robot that cannot go sideways \[rad/s\]; none for one that can.
     turn_rate: Option<f64>,
+    /// Velocities that it was sent since its last pose, each with the time from which it holds \[s\].
+    sent: VecDeque<(f64, Twist)>,
 }
 
 enum Topic {
@@ -26,23 +40,25 @@ impl Drive {
                 RawVelocityType::Twist => Topic::Plain(node.publisher(topic, quality)?),
                 RawVelocityType::TwistStamped => Topic::Stamped(node.publisher(topic, quality)?),
             },
-            turn_rate: match raw.flight.model {
-                RawModel::Unicycle { turn_rate } => Some(turn_rate.to_radians()),
-                _ => None,
+            steering: Steering {
+                turn_rate: match raw.flight.model {
+                    RawModel::Unicycle { turn_rate } => Some(turn_rate.to_radians()),
+                    _ => None,
+                },
+                sent: VecDeque::new(),
             },
         })
     }
 
     /// Publishes the velocity towards the target, zero for a member without one.
     pub fn publish(
-        &self,
+        &mut self,
         control: &Control,
         member: usize,
         target: Option<[f64; 2]>,
         header: Header,
     ) -> Result<(), EdgeError> {
-        let twist =
-            target.and_then(|target| towards(control, member, target, self.turn_rate)).unwrap_or_default();
+        let twist = self.steering.next(control, member, target);
         match &self.topic {
             Topic::Plain(topic) => topic.publish(&twist),
             Topic::Stamped(topic) => topic.publish(&TwistStamped { header, twist }),
@@ -50,21 +66,62 @@ impl Drive {
     }
 }
 
-/// The velocity towards a member's target \[m\]. That of a member that takes time to brake is where it comes to rest, far
-/// ahead of what it goes in a period.
-fn towards(control: &Control, member: usize, target: [f64; 2], turn_rate: Option<f64>) -> Option<Twist> {
-    let (here, period, limits) = (control.position(member)?, control.period(), control.limits());
-    // What stops at once stands wherever it is by now, which a late pose does not say.
-    let stands = !limits.brakes && limits.acceleration.is_infinite();
-    if control.mode() == Mode::EmergencyStopped && stands {
-        return None;
+impl Steering {
+    /// The velocity towards a target \[m\] from the last tick on, zero without one.
+    fn next(&mut self, control: &Control, member: usize, target: Option<[f64; 2]>) -> Twist {
+        let now = control.now();
+        let age = control.age(member).unwrap_or(0.0);
+        self.forget(now - age, now);
+        let twist = target.and_then(|target| self.towards(control, member, target)).unwrap_or_default();
+        self.sent.push_back((now, twist.clone()));
+        twist
     }
-    let braking = control.next_velocity(member, target);
-    let velocity = braking.unwrap_or([0, 1].map(|k| (target[k] - here[k]) / period));
-    Some(twist(velocity, control.yaw(member)?, period, limits.speed, turn_rate))
+
+    /// Forgets velocities that were over at a pose of this time \[s\], and all of them where the clock has been set back.
+    fn forget(&mut self, stamp: f64, now: f64) {
+        if self.sent.back().is_some_and(|&(from, _)| from > now) {
+            self.sent.clear();
+        }
+        while self.sent.get(1).is_some_and(|&(next, _)| next <= stamp) {
+            self.sent.pop_front();
+        }
+    }
+
+    /// That of a member that takes time to brake is to end the period on its way to where it comes to rest, far ahead.
+    fn towards(&self, control: &Control, member: usize, target: [f64; 2]) -> Option<Twist> {
+        let (period, limits) = (control.period(), control.limits());
+        // What stops at once stands wherever it is by now, of which nothing else is sure.
+        let stands = !limits.brakes && limits.acceleration.is_infinite();
+        if control.mode() == Mode::EmergencyStopped && stands {
+            return None;
+        }
+        let pose = (control.position(member)?, control.yaw(member)?);
+        let now = control.now();
+        let (here, yaw) = self.carried(pose, now - control.age(member)?, now);
+        let braking = control.next_velocity(member, target);
+        let velocity = braking.unwrap_or([0, 1].map(|k| (target[k] - here[k]) / period));
+        Some(twist(velocity, yaw, period, limits.speed, self.turn_rate))
+    }
+
+    /// The place \[m\] and heading \[rad\] to which the velocities sent have led from those at `stamp` until `now` \[s\].
+    fn carried(&self, (mut place, mut yaw): ([f64; 2], f64), stamp: f64, now: f64) -> ([f64; 2], f64) {
+        for (k, (from, Twist { linear, angular })) in self.sent.iter().enumerate() {
+            let end = self.sent.get(k + 1).map_or(now, |&(next, _)| next.min(now));
+            let time = end - from.max(stamp);
+            if time > 0.0 {
+                // On average it goes as it heads half-way.
+                let (sin, cos) = (yaw + 0.5 * angular.z * time).sin_cos();
+                place[0] += time * (cos * linear.x - sin * linear.y);
+                place[1] += time * (sin * linear.x + cos * linear.y);
+                yaw += angular.z * time;
+            }
+        }
+        (place, yaw)
+    }
 }
 
-/// How far a robot that turns while it drives may leave the straight way in a period \[m\].
+/// How far a robot that turns while it drives may leave the straight way in a period, and stay away from its target: nearer than that
+/// it would turn about for every rounding \[m\].
 const ASIDE: f64 = 1e-3;
 
 /// The command of a robot that is to go on with a velocity \[m/s, world frame\] for a period \[s\].
@@ -79,7 +136,10 @@ fn twist(velocity: [f64; 2], yaw: f64, period: f64, speed: f64, turn_rate: Optio
             twist.linear = Vector3 { x: ahead[0] * scale, y: ahead[1] * scale, z: 0.0 };
         }
         Some(turn_rate) => {
-            let error = if velocity == [0.0; 2] { 0.0 } else { ahead[1].atan2(ahead[0]) };
+            if period * f64::hypot(ahead[0], ahead[1]) < ASIDE {
+                return twist;
+            }
+            let error = ahead[1].atan2(ahead[0]);
             twist.angular.z = (error / period).clamp(-turn_rate, turn_rate);
             // It keeps clear of others on the straight way alone: it turns first, and drives in a turn only as far as leads
             // it hardly aside, by half the turn.
@@ -118,6 +178,7 @@ mod tests {
             Swarm::parse("drive", "drive.toml", text, &[], None).unwrap_or_else(|error| panic!("{error}"));
         for stop in [None, Some(60)] {
             let mut control = Control::new(&swarm).expect("laid out");
+            let mut steering = Steering::default();
             let (mut x, mut v, mut most, mut fastest) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
             for tick in 0..300 {
                 let now = 0.05 * f64::from(tick);
@@ -130,7 +191,7 @@ mod tests {
                 }
                 control.tick(now);
                 let target = control.target(0).expect("it is heard");
-                let twist = towards(&control, 0, target, None).expect("it is heard");
+                let twist = steering.next(&control, 0, Some(target));
                 // Its base speeds up and brakes within its limit too.
                 let next = v + (twist.linear.x - v).clamp(-0.04, 0.04);
                 (x, v) = (x + 0.025 * (v + next), next);
@@ -139,6 +200,57 @@ mod tests {
             let end = if stop.is_some() { 4.6 } else { 6.0 };
             assert!(fastest > 1.4 && v.abs() < 1e-6 && most < end + 1e-6, "{stop:?}: {x}, {v}, {most}");
             assert!(stop.is_some() || (x - 6.0).abs() < 1e-6, "{x}");
+        }
+    }
+
+    /// Robots that do as they are driven, seen late: they pass through their targets, as those do that see themselves at once.
+    #[test]
+    fn robots_that_are_seen_late_pass_through_their_targets_and_arrive() {
+        const PERIOD: f64 = 0.1;
+        for (model, goal) in [("integrator\"", [3.0, 0.0]), ("unicycle\", turn_rate = 90.0", [-0.5, 2.0])] {
+            let text = format!(
+                "title = \"drive\"\nradius = 0.2\nlinks = {{ kind = \"nearest\", count = 1 }}\n\
+                 robots = [{{ name = \"a\", place = [0.0, 0.0] }}, {{ name = \"b\", place = [0.0, 9.0] }}]\n\
+                 leaders = [{{ robots = [\"a\", \"b\"], program = {{ kind = \"path\", points = [{{ at = 8.0, displacement = {goal:?} }}] }} }}]\n\
+                 limits = {{ speed = 1.5, clearance = 0.3 }}\nposes = {{ fresh = 1.0, age_limit = 1.0 }}\n\
+                 control = {{ period = {PERIOD} }}\nflight = {{ model = {{ kind = \"{model} }} }}\n"
+            );
+            let swarm = Swarm::parse("drive", "drive.toml", &text, &[], None)
+                .unwrap_or_else(|error| panic!("{error}"));
+            // The last of them slips, and goes a twentieth less than it is driven.
+            for (late, slip) in [(0, 0.0), (1, 0.0), (4, 0.0), (7, 0.0), (4, 0.05)] {
+                let mut control = Control::new(&swarm).expect("laid out");
+                let turn_rate = model.starts_with("unicycle").then_some(FRAC_PI_2);
+                let mut steering = Steering { turn_rate, ..Steering::default() };
+                let mut robot = Steering { turn_rate, ..Steering::default() };
+                let mut poses = vec![([0.0; 2], 0.0)];
+                let (mut off, mut turned) = (0.0_f64, 0.0_f64);
+                for tick in 0..200 {
+                    let now = f64::from(tick) * PERIOD;
+                    if let Some(old) = (tick as usize).checked_sub(late) {
+                        let (position, yaw) = poses[old];
+                        let pose = Pose { position, yaw, stamp: old as f64 * PERIOD, frame_is_right: true };
+                        control.receive(0, pose, now).expect("a pose");
+                        control.receive(1, Pose { position: [0.0, 9.0], ..pose }, now).expect("a pose");
+                    }
+                    control.tick(now);
+                    let target = control.target(0);
+                    let Twist { mut linear, angular } = steering.next(&control, 0, target);
+                    turned += PERIOD * angular.z.abs();
+                    (linear.x, linear.y) = ((1.0 - slip) * linear.x, (1.0 - slip) * linear.y);
+                    robot.sent = VecDeque::from([(now, Twist { linear, angular })]);
+                    let next = robot.carried(poses[tick as usize], now, now + PERIOD);
+                    if let Some(target) = target.filter(|_| turn_rate.is_none()) {
+                        off = off.max((next.0[0] - target[0]).hypot(next.0[1] - target[1]));
+                    }
+                    poses.push(next);
+                }
+                let (end, yaw) = poses[200];
+                let rest = (end[0] - goal[0]).hypot(end[1] - goal[1]);
+                let most = if slip > 0.0 { 0.02 } else { ASIDE };
+                assert!(rest < most && off < most, "{model}, {late} late: {rest} m, {off} m");
+                assert!(turned < 2.5, "{model}, {late} late: turned by {turned} rad to head at {yaw}");
+            }
         }
     }
 

@@ -67,7 +67,7 @@ impl Endpoints {
             return;
         }
         self.is_driving = active;
-        for (member, drive) in &self.drives {
+        for (member, drive) in &mut self.drives {
             let target = control.target(*member).filter(|_| active);
             statistics.sent(drive.publish(control, *member, target, header.clone()));
         }

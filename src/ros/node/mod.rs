@@ -459,10 +459,6 @@ impl FormationNode {
         for (kind, text, values) in commanded.events {
             self.record_event(now, kind, &text, &values);
         }
-        // A node that was switched off in an emergency stop stays off after it.
-        if !self.lifecycle.is_active() {
-            self.control.set_active(false);
-        }
     }
 
     /// Problems of the network around the node, and of its clock.

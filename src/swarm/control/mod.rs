@@ -97,7 +97,8 @@ pub struct Control {
     max_faulty: usize,
     sweeps: usize,
     period: f64,
-    mode: Mode,
+    is_stopped: bool,
+    is_active: bool,
     ticks: u64,
     /// Periods run since the period last changed: the leaders' programs stand still in an emergency stop.
     run: u64,
@@ -151,7 +152,8 @@ impl Control {
             max_faulty,
             sweeps: swarm.raw.control.sweeps,
             period,
-            mode: Mode::Running,
+            is_stopped: false,
+            is_active: true,
             ticks: 0,
             run: 0,
             run_before: 0.0,
@@ -211,7 +213,16 @@ impl Control {
 
     /// The loop's way with targets.
     pub fn mode(&self) -> Mode {
-        self.mode
+        match (self.is_stopped, self.is_active) {
+            (true, _) => Mode::EmergencyStopped,
+            (false, true) => Mode::Running,
+            (false, false) => Mode::Inactive,
+        }
+    }
+
+    /// When the last tick was \[s\].
+    pub(crate) fn now(&self) -> f64 {
+        self.now
     }
 
     /// Ticks so far.
@@ -322,32 +333,30 @@ impl Control {
 
     /// Brings every member to rest from the next tick on, and holds it there until [`Control::resume`].
     pub fn emergency_stop(&mut self) {
-        if self.mode != Mode::EmergencyStopped {
-            self.mode = Mode::EmergencyStopped;
+        if !self.is_stopped {
+            self.is_stopped = true;
             self.held.fill(None);
         }
     }
 
     /// Lifts an emergency stop; false if there is none.
     pub fn resume(&mut self) -> bool {
-        let stopped = self.mode == Mode::EmergencyStopped;
-        if stopped {
-            self.mode = Mode::Running;
-        }
-        stopped
+        std::mem::take(&mut self.is_stopped)
     }
 
-    /// Switches the loop on or off; an emergency stop outlasts both.
+    /// Switches the loop on or off; an emergency stop outlasts both. Others may have moved the members in the meantime: one that is
+    /// switched on in a stop holds them where they are by then.
     pub fn set_active(&mut self, active: bool) {
-        if self.mode != Mode::EmergencyStopped {
-            self.mode = if active { Mode::Running } else { Mode::Inactive };
+        if active && !self.is_active {
+            self.held.fill(None);
         }
+        self.is_active = active;
     }
 
     /// The part of the state that outlasts the process, for [`Control::restore`].
     pub fn kept(&self) -> ControlSnapshot {
         ControlSnapshot {
-            is_stopped: self.mode == Mode::EmergencyStopped,
+            is_stopped: self.is_stopped,
             program_time: self.program_time(),
             periods: self.periods,
             leads: self.formation.kept_leads(),
@@ -385,7 +394,7 @@ impl Control {
                 self.leave_at(member, place);
             }
         }
-        if earlier.mode == Mode::EmergencyStopped {
+        if earlier.is_stopped {
             self.emergency_stop();
         }
     }
@@ -440,10 +449,10 @@ impl Control {
         self.now = now;
         self.look(now);
         self.follow_tracks(now);
-        if self.mode == Mode::Running {
+        if self.mode() == Mode::Running {
             self.follow();
         }
-        let active = self.mode != Mode::Inactive;
+        let active = self.is_active;
         let Self { present, velocity, ages, usable: known, tracked, .. } = self;
         let places = &*present;
         let (present, velocity, ages) = match self.brakes {
@@ -452,16 +461,14 @@ impl Control {
         };
         let seen =
             safety::Seen { present, known, ages, velocity: Some(velocity), strays: Some(&tracked.strays) };
-        match self.mode {
-            Mode::Inactive => self.wanted.clone_from(places),
-            Mode::EmergencyStopped => {
-                for member in (0..known.len()).filter(|&member| known[member]) {
-                    let stops = || self.filter.stopping_place(&seen, self.period, member);
-                    let place = *self.held[member].get_or_insert_with(stops);
-                    self.wanted.set(member, place);
-                }
+        if !active {
+            self.wanted.clone_from(places);
+        } else if self.is_stopped {
+            for member in (0..known.len()).filter(|&member| known[member]) {
+                let stops = || self.filter.stopping_place(&seen, self.period, member);
+                let place = *self.held[member].get_or_insert_with(stops);
+                self.wanted.set(member, place);
             }
-            Mode::Running => {}
         }
         self.filter.apply(&seen, &self.wanted, self.period, &mut self.safe, &mut self.filtered);
         if !active {
@@ -589,7 +596,7 @@ impl Control {
 
     /// The member's safe target \[m\]; `None` without a usable pose, and while the loop is inactive.
     pub fn target(&self, member: usize) -> Option<[f64; 2]> {
-        (self.mode != Mode::Inactive && self.usable[member]).then(|| self.safe.get(member))
+        (self.is_active && self.usable[member]).then(|| self.safe.get(member))
     }
 
     /// The member's target by the rule alone \[m\].

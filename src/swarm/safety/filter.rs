@@ -168,6 +168,12 @@ impl Filter {
         if self.fastest.is_finite() { self.fastest } else { self.limits.speed }
     }
 
+    /// The longest way of a member in a period \[m\], with that of the time since its pose, in which another limit may have held.
+    pub(super) fn longest_step(&self, period: f64, ahead: f64) -> f64 {
+        let before = if ahead > 0.0 { self.fastest() * ahead } else { 0.0 };
+        self.limits.speed * period + before
+    }
+
     /// Forgets the targets of the ticks before: others may move the members.
     pub(crate) fn forget(&mut self) {
         for member in 0..self.radii.len() {
@@ -239,7 +245,7 @@ impl Filter {
         let (here, last) = (seen.present.get(member), self.sent.get(member));
         // One that has not come so far, or was carried away, is given its way from where it is seen.
         let age = seen.ages[member].max(0.0);
-        let is_near = distance(here, last) <= self.limits.speed * (period + age);
+        let is_near = distance(here, last) <= self.fastest() * (period + age);
         let goes_on = is_near && self.ahead(seen, member) > 0.0;
         let is_there = is_near || age > (1.0 - TOUCHING) * period || self.limits.deviation > 0.0;
         let has_arrived =
@@ -305,7 +311,7 @@ impl Filter {
         }
         // As wide as most queries: a member with a way much longer than the mean queries the grid itself.
         let oldest = (0..count).map(|member| self.ahead(seen, member)).fold(0.0, f64::max);
-        let step = self.limits.speed * (period + oldest);
+        let step = self.longest_step(period, oldest);
         let ways =
             seen.present.iter().zip(wanted.iter()).map(|(here, there)| distance(here, there).min(step));
         let (mut sum, mut finite, mut longest) = (0.0, 0.0, 0.0_f64);

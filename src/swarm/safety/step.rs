@@ -96,7 +96,7 @@ impl Filter {
     }
 
     fn request(&self, motion: Option<Motion>, way: [f64; 2], period: f64, ahead: f64) -> MotionRequest {
-        let (step, distance) = (self.limits.speed * (period + ahead), length(way));
+        let (step, distance) = (self.longest_step(period, ahead), length(way));
         match motion {
             None => MotionRequest { way, distance, step, reach: distance.min(step) },
             Some(Motion { from, velocity }) => {
