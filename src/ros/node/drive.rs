@@ -6,11 +6,14 @@
 
 use std::collections::VecDeque;
 
+use crate::geometry::point::minus;
 use crate::messages::geometry_msgs::{Twist, TwistStamped, Vector3};
 use crate::messages::std_msgs::Header;
 use crate::ros::edge::{EdgeError, Node, Publisher, Quality};
 use crate::scene::swarm::raw::{RawModel, RawSwarm, RawVelocityType};
 use crate::swarm::control::{Control, Mode};
+use crate::swarm::safety::Limits;
+use crate::swarm::watch::Pose;
 
 /// Velocities of one member, in its own axes (REP 103: x ahead, y to the left).
 pub struct Drive {
@@ -25,6 +28,8 @@ struct Steering {
     turn_rate: Option<f64>,
     /// Velocities that it was sent since its last pose, each with the time from which it holds \[s\].
     sent: VecDeque<(f64, Twist)>,
+    /// Its last pose, with less of the noise.
+    last: Option<Pose>,
 }
 
 enum Topic {
@@ -45,7 +50,7 @@ impl Drive {
                     RawModel::Unicycle { turn_rate } => Some(turn_rate.to_radians()),
                     _ => None,
                 },
-                sent: VecDeque::new(),
+                ..Steering::default()
             },
         })
     }
@@ -70,11 +75,37 @@ impl Steering {
     /// The velocity towards a target \[m\] from the last tick on, zero without one.
     fn next(&mut self, control: &Control, member: usize, target: Option<[f64; 2]>) -> Twist {
         let now = control.now();
-        let age = control.age(member).unwrap_or(0.0);
-        self.forget(now - age, now);
+        if let Some(pose) = control.watch().pose(member) {
+            self.see(pose, control.limits(), control.period());
+            self.forget(pose.stamp, now);
+        }
         let twist = target.and_then(|target| self.towards(control, member, target)).unwrap_or_default();
         self.sent.push_back((now, twist.clone()));
         twist
+    }
+
+    /// Takes in a pose. That of the noise which is declared is weighed against where the velocities have led since the one before,
+    /// from which a robot is taken to stray by a part of its way: a step of the Kalman filter of such a walk, once it is steady.
+    fn see(&mut self, pose: Pose, limits: &Limits, period: f64) {
+        /// What a robot strays from where it is driven, over its way \[1\].
+        const SLIP: f64 = 0.1;
+        /// Deviations beyond which a pose is no noise \[1\].
+        const MOST: f64 = 6.0;
+        let Some(last) = self.last.filter(|last| last.stamp < pose.stamp) else {
+            let is_old = self.last.is_some_and(|last| last.stamp == pose.stamp);
+            self.last = if is_old { self.last } else { Some(pose) };
+            return;
+        };
+        let (expected, _) = self.carried((last.position, last.yaw), last.stamp, pose.stamp);
+        let off = minus(pose.position, expected);
+        let ratio = SLIP * limits.speed * period / limits.deviation;
+        let gain = if ratio.is_finite() && f64::hypot(off[0], off[1]) <= MOST * limits.deviation {
+            ratio * (ratio.hypot(2.0) - ratio) / 2.0
+        } else {
+            1.0
+        };
+        let position = if gain < 1.0 { [0, 1].map(|k| expected[k] + gain * off[k]) } else { pose.position };
+        self.last = Some(Pose { position, ..pose });
     }
 
     /// Forgets velocities that were over at a pose of this time \[s\], and all of them where the clock has been set back.
@@ -95,9 +126,8 @@ impl Steering {
         if control.mode() == Mode::EmergencyStopped && stands {
             return None;
         }
-        let pose = (control.position(member)?, control.yaw(member)?);
-        let now = control.now();
-        let (here, yaw) = self.carried(pose, now - control.age(member)?, now);
+        let last = self.last?;
+        let (here, yaw) = self.carried((last.position, last.yaw), last.stamp, control.now());
         let braking = control.next_velocity(member, target);
         let velocity = braking.unwrap_or([0, 1].map(|k| (target[k] - here[k]) / period));
         Some(twist(velocity, yaw, period, limits.speed, self.turn_rate))
@@ -120,9 +150,11 @@ impl Steering {
     }
 }
 
-/// How far a robot that turns while it drives may leave the straight way in a period, and stay away from its target: nearer than that
-/// it would turn about for every rounding \[m\].
+/// How far a robot that turns while it drives may leave the straight way in a period \[m\].
 const ASIDE: f64 = 1e-3;
+
+/// A target that is nearer than this is reached: a robot that turns first would turn about for every rounding \[m\].
+const REACHED: f64 = 1e-6;
 
 /// The command of a robot that is to go on with a velocity \[m/s, world frame\] for a period \[s\].
 fn twist(velocity: [f64; 2], yaw: f64, period: f64, speed: f64, turn_rate: Option<f64>) -> Twist {
@@ -136,7 +168,7 @@ fn twist(velocity: [f64; 2], yaw: f64, period: f64, speed: f64, turn_rate: Optio
             twist.linear = Vector3 { x: ahead[0] * scale, y: ahead[1] * scale, z: 0.0 };
         }
         Some(turn_rate) => {
-            if period * f64::hypot(ahead[0], ahead[1]) < ASIDE {
+            if period * f64::hypot(ahead[0], ahead[1]) < REACHED {
                 return twist;
             }
             let error = ahead[1].atan2(ahead[0]);
@@ -155,9 +187,12 @@ fn twist(velocity: [f64; 2], yaw: f64, period: f64, speed: f64, turn_rate: Optio
 mod tests {
     use std::f64::consts::FRAC_PI_2;
 
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::StandardNormal;
+    use rand_pcg::Pcg64Mcg;
+
     use super::*;
     use crate::scene::swarm::Swarm;
-    use crate::swarm::watch::Pose;
 
     #[test]
     fn velocities_are_in_the_robot_s_own_axes_and_within_its_limits() {
@@ -252,6 +287,40 @@ mod tests {
                 assert!(turned < 2.5, "{model}, {late} late: turned by {turned} rad to head at {yaw}");
             }
         }
+    }
+
+    /// One that followed each pose would go to and fro by 1.4 deviations in every period.
+    #[test]
+    fn a_robot_that_stands_follows_little_of_the_noise_of_its_poses() {
+        const PERIOD: f64 = 0.1;
+        const NOISE: f64 = 0.03;
+        let text = format!(
+            "title = \"noise\"\nradius = 0.2\nlinks = {{ kind = \"nearest\", count = 1 }}\n\
+             robots = [{{ name = \"a\", place = [0.0, 0.0] }}, {{ name = \"b\", place = [0.0, 9.0] }}]\n\
+             leaders = [{{ robots = [\"a\", \"b\"], program = {{ kind = \"external\" }} }}]\nlimits = {{ speed = 1.5, clearance = 0.3 }}\n\
+             control = {{ period = {PERIOD} }}\nflight = {{ noise = {NOISE}, model = {{ kind = \"integrator\" }} }}\n"
+        );
+        let swarm =
+            Swarm::parse("noise", "noise.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+        let mut control = Control::new(&swarm).expect("laid out");
+        let mut steering = Steering::default();
+        let mut random = Pcg64Mcg::seed_from_u64(3);
+        let (mut place, mut squares, ticks) = ([0.0_f64; 2], [0.0_f64; 2], 2_000);
+        for tick in 0..ticks {
+            let now = f64::from(tick) * PERIOD;
+            for (member, here) in [(0, place), (1, [0.0, 9.0])] {
+                let position = here.map(|x| x + NOISE * random.sample::<f64, _>(StandardNormal));
+                let pose = Pose { position, yaw: 0.0, stamp: now, frame_is_right: true };
+                control.receive(member, pose, now).expect("a pose");
+            }
+            control.tick(now);
+            let Twist { linear, .. } = steering.next(&control, 0, control.target(0));
+            place = [place[0] + PERIOD * linear.x, place[1] + PERIOD * linear.y];
+            squares[0] += (linear.x.powi(2) + linear.y.powi(2)) / f64::from(2 * ticks);
+            squares[1] += (place[0].powi(2) + place[1].powi(2)) / f64::from(2 * ticks);
+        }
+        let [speed, off] = squares.map(f64::sqrt);
+        assert!(speed < 0.5 * NOISE / PERIOD && off < 0.6 * NOISE, "{speed} m/s, {off} m");
     }
 
     #[test]
