@@ -211,29 +211,36 @@ mod tests {
                     control = { period = 0.05 }\nflight = { model = { kind = \"double-integrator\" } }\n";
         let swarm =
             Swarm::parse("drive", "drive.toml", text, &[], None).unwrap_or_else(|error| panic!("{error}"));
-        for stop in [None, Some(60)] {
+        for (stop, late) in [(None, 0), (Some(60), 0), (None, 6), (Some(60), 6)] {
             let mut control = Control::new(&swarm).expect("laid out");
             let mut steering = Steering::default();
             let (mut x, mut v, mut most, mut fastest) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
+            let mut places = vec![x];
             for tick in 0..300 {
                 let now = 0.05 * f64::from(tick);
-                for (member, y) in [(0, 0.0), (1, 4.0)] {
-                    let pose = Pose { position: [x, y], yaw: 0.0, stamp: now, frame_is_right: true };
+                let seen = (tick as usize).checked_sub(late).map(|old| (0.05 * old as f64, places[old]));
+                for ((member, y), (stamp, x)) in
+                    [(0, 0.0), (1, 4.0)].into_iter().zip(seen.into_iter().cycle())
+                {
+                    let pose = Pose { position: [x, y], yaw: 0.0, stamp, frame_is_right: true };
                     control.receive(member, pose, now).expect("a pose");
                 }
                 if Some(tick) == stop {
                     control.emergency_stop();
                 }
                 control.tick(now);
-                let target = control.target(0).expect("it is heard");
-                let twist = steering.next(&control, 0, Some(target));
+                let twist = steering.next(&control, 0, control.target(0));
                 // Its base speeds up and brakes within its limit too.
                 let next = v + (twist.linear.x - v).clamp(-0.04, 0.04);
                 (x, v) = (x + 0.025 * (v + next), next);
                 (most, fastest) = (most.max(x), fastest.max(v));
+                places.push(x);
             }
             let end = if stop.is_some() { 4.6 } else { 6.0 };
-            assert!(fastest > 1.4 && v.abs() < 1e-6 && most < end + 1e-6, "{stop:?}: {x}, {v}, {most}");
+            assert!(
+                fastest > 1.4 && v.abs() < 1e-6 && most < end + 1e-6,
+                "{stop:?}, {late}: {x}, {v}, {most}"
+            );
             assert!(stop.is_some() || (x - 6.0).abs() < 1e-6, "{x}");
         }
     }
