@@ -2,18 +2,20 @@
 
 use std::collections::BTreeSet;
 use std::sync::atomic::AtomicBool;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use flockform::flock::vectors::distance;
+use flockform::messages::builtin_interfaces::Time;
 use flockform::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
+use flockform::messages::geometry_msgs;
 use flockform::messages::geometry_msgs::{Pose, PoseStamped, Twist, TwistStamped};
 use flockform::messages::rosgraph_msgs::Clock;
 use flockform::messages::std_msgs::Header;
 use flockform::messages::tf2_msgs::TFMessage;
-use flockform::messages::{builtin_interfaces, geometry_msgs};
 use flockform::ros::edge::Quality;
 use flockform::ros::node::FormationNode;
 use flockform::ros::robots::{Layout, RobotNodes};
+use flockform::scene::swarm::Swarm;
 use flockform::swarm::watch::Health;
 
 use super::formation::{PATIENT, Swarming, arguments, change, square};
@@ -68,7 +70,7 @@ fn poses_come_in_every_type_of_message() {
 }
 
 pub fn stamped(place: [f64; 2], frame_id: &str) -> PoseStamped {
-    let header = Header { stamp: builtin_interfaces::Time::default(), frame_id: frame_id.into() };
+    let header = Header { stamp: Time::default(), frame_id: frame_id.into() };
     PoseStamped { header, pose: Pose::planar(place, 0.0) }
 }
 
@@ -103,27 +105,58 @@ fn leaders_are_moved_by_topic_in_the_swarm_s_frame_alone() {
     assert!(away(&swarm, |[x, y]| [x + 1.0, y - 0.5]) < 0.01);
 }
 
+/// Robots that have nothing but their velocities, and are seen a quarter of a second late.
 #[test]
-fn velocities_lead_to_the_targets() {
+fn velocities_lead_robots_with_late_poses_to_their_targets() {
+    const LATE: f64 = 0.25;
     let peers = peers();
-    let hearer = peers.theirs.node("/", "driver").expect("a node");
-    let plain = hearer.subscription::<Twist>("/robot_7/cmd_vel", Quality::reliable(1)).expect("hears");
-    // Slower than the limit, so that the way to the target is all there is to the velocity.
-    let slow = "manoeuvres[0].legs=[{ seconds = 100.0, translate = [20.0, 10.0] }]";
-    let overrides = with(&[slow, "limits.speed=4.0", "node.velocity=\"twist\""]);
-    let mut swarm = Swarming::open(&square(&overrides), &[]);
-    swarm.until_all_are_heard();
-    until("a velocity on the way", || {
-        while plain.take().is_some() {}
-        swarm.tick();
-        let control = swarm.node.control();
-        let (here, there) = (control.position(6)?, control.target(6)?);
-        let expected = [0, 1].map(|k| (there[k] - here[k]) / control.period());
-        std::thread::sleep(Duration::from_millis(30));
-        let (twist, _) = plain.take_last()?;
-        let speed = f64::hypot(twist.linear.x, twist.linear.y);
-        // Robots of this model never turn: their axes are the world's.
-        (distance([twist.linear.x, twist.linear.y], expected) < 1e-9 && speed > 0.01).then_some(())
+    let text = "title = \"driven\"\nradius = 0.2\nlinks = { kind = \"nearest\", count = 1 }\n\
+                robots = [{ name = \"left\", place = [0.0, 0.0] }, { name = \"right\", place = [2.0, 0.0] }]\n\
+                leaders = [{ robots = [\"left\", \"right\"], program = { kind = \"path\", points = [{ at = 1.0, displacement = [0.5, 0.3] }] } }]\n\
+                limits = { speed = 1.5, clearance = 0.3 }\nposes = { fresh = 4.0, age_limit = 5.0, stop_after = 9.0 }\n\
+                control = { period = 0.03 }\nnode = { velocity = \"twist\" }\nflight = { model = { kind = \"integrator\" } }\n";
+    let swarm = Swarm::parse("driven", "driven.toml", text, &[], None).expect("a swarm");
+    let mut node = FormationNode::open(&swarm, &arguments(&[]), None).expect("a node");
+    let bases = peers.theirs.node("/", "bases").expect("a node");
+    let mut robots = ["left", "right"].map(|name| {
+        let velocities = bases.subscription::<Twist>(&format!("/{name}/cmd_vel"), Quality::reliable(1));
+        let poses = bases.publisher::<PoseStamped>(&format!("/{name}/pose"), Quality::BEST_EFFORT);
+        (velocities.expect("hears"), poses.expect("out"), Twist::default())
+    });
+    let time = || SystemTime::now().duration_since(UNIX_EPOCH).expect("after 1970").as_secs_f64();
+    let starts: Vec<_> = node.control().formation().places.iter().collect();
+    let goals: Vec<_> = starts.iter().map(|[x, y]| [x + 0.5, y + 0.3]).collect();
+    // When, and where each was.
+    let mut been = vec![(time(), starts)];
+    let mut at_rest = 0;
+    until("they stand where they were led", || {
+        let now = time();
+        let (then, mut places) = been.last().expect("the start").clone();
+        for ((velocities, _, twist), place) in robots.iter_mut().zip(&mut places) {
+            *place = [place[0] + (now - then) * twist.linear.x, place[1] + (now - then) * twist.linear.y];
+            *twist = velocities.take_last().map_or_else(|| twist.clone(), |(twist, _)| twist);
+        }
+        been.push((now, places.clone()));
+        if let Some((stamp, late)) = been.iter().rfind(|(then, _)| *then <= now - LATE) {
+            for ((_, poses, _), place) in robots.iter().zip(late) {
+                let header = Header { stamp: Time::from_seconds(*stamp), frame_id: "map".into() };
+                poses.publish(&PoseStamped { header, pose: Pose::planar(*place, 0.0) }).expect("sent");
+            }
+        }
+        std::thread::sleep(Duration::from_millis(15));
+        node.tick();
+        std::thread::sleep(Duration::from_millis(15));
+        let is_there = places.iter().zip(&goals).all(|(place, goal)| distance(*place, *goal) < 0.02);
+        println!(
+            "{:.3} {places:.4?} {:?} target {:?} age {:?} twist {:?}",
+            now - been[0].0,
+            node.control().health(0),
+            node.control().target(0),
+            node.control().age(0),
+            (robots[0].2.linear.x, robots[0].2.linear.y)
+        );
+        at_rest = if is_there { at_rest + 1 } else { 0 };
+        (at_rest > 30).then_some(())
     });
 }
 
@@ -211,7 +244,7 @@ fn a_pose_without_a_stamp_is_as_old_as_its_arrival_by_whatever_clock() {
         let mut time = 100.0;
         until("robot_7 is heard", || {
             time += 0.01;
-            let message = Clock { clock: builtin_interfaces::Time::from_seconds(time) };
+            let message = Clock { clock: Time::from_seconds(time) };
             clock.publish(&message).expect("sent");
             pose.publish(&stamped([1.5, 1.5], "map")).expect("sent");
             std::thread::sleep(Duration::from_millis(5));
@@ -243,7 +276,7 @@ fn a_node_without_the_clock_that_it_is_to_go_by_says_so_until_one_comes() {
     let mut time = 100.0;
     let mut tell = || {
         time += 0.02;
-        let message = Clock { clock: builtin_interfaces::Time::from_seconds(time) };
+        let message = Clock { clock: Time::from_seconds(time) };
         clock.publish(&message).expect("sent");
     };
     until("no word about the clock", || status(&mut tell).filter(|status| !misses(status)));
@@ -271,7 +304,7 @@ fn a_node_ticks_as_its_simulator_s_time_goes_on_and_rests_while_it_stands() {
             (true, false) => turns_at_rest += 1,
             (false, _) => {}
         }
-        let message = Clock { clock: builtin_interfaces::Time::from_seconds(time) };
+        let message = Clock { clock: Time::from_seconds(time) };
         clock.publish(&message).expect("sent");
         turns_at_rest < 50
     });

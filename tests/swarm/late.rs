@@ -410,3 +410,80 @@ fn a_loop_that_is_switched_on_in_a_stop_holds_robots_where_they_are_by_then() {
         "a stop that is lifted switches nothing on"
     );
 }
+
+/// It went as it was sent at the time.
+#[test]
+fn a_lost_robot_is_kept_clear_of_though_the_speed_limit_is_lowered_by_then() {
+    for late in [0, 2] {
+        let sets = ["limits.acceleration=1.0", "poses={ fresh=0.5, age_limit=0.6, stop_after=1.0 }"]
+            .map(str::to_owned);
+        let mut control = Control::new(&circle_with("double-integrator\"", &sets)).expect("laid out");
+        let model = Model::DoubleIntegrator(DoubleIntegrator { speed: 1.0, acceleration: 1.0 });
+        let places: Vec<[f64; 2]> = (0..ROBOTS).map(|k| [10.0 * k as f64, 0.0]).collect();
+        let mut robots: Vec<Robot> = places.iter().map(|&place| Robot::at(place, 0.0)).collect();
+        robots[1] = Robot::at([2.0, 3.0], 0.0);
+        let mut poses = vec![];
+        let mut gap = f64::INFINITY;
+        for tick in 0..160_usize {
+            let now = tick as f64 * PERIOD;
+            poses.push(robots.iter().map(|robot| robot.position).collect::<Vec<_>>());
+            if let Some(old) = tick.checked_sub(late) {
+                for k in (0..ROBOTS).filter(|&k| k > 0 || tick < 17) {
+                    let (position, stamp) = (poses[old][k], old as f64 * PERIOD);
+                    let pose = Pose { position, yaw: 0.0, stamp, frame_is_right: true };
+                    control.receive(k, pose, now).expect("a pose");
+                }
+            }
+            if tick == 0 {
+                assert!(control.place_leader(0, [8.0, 0.0]) && control.place_leader(1, [2.0, 3.0]));
+                (2..ROBOTS).for_each(|k| assert!(control.place_leader(k, places[k])));
+            }
+            if tick == 42 {
+                control.set_limits(Limits { speed: 0.25, ..control.limits().clone() }).expect("limits");
+                assert!(control.place_leader(1, [2.0, -1.0]));
+            }
+            control.tick(now);
+            for (k, robot) in robots.iter_mut().enumerate() {
+                robot.step(&model, control.target(k).unwrap_or(robot.position), PERIOD);
+            }
+            gap = gap.min(distance(robots[0].position, robots[1].position) - 0.3);
+        }
+        let stood = robots[0].position[0];
+        assert!(robots[1].position[1] < 1.5 && (1.5..2.5).contains(&stood), "they meet: {robots:?}");
+        assert!(gap >= 0.1 - 1e-9, "{late} late: {gap} m");
+    }
+}
+
+/// As it was in the loop before: what is lost on the way holds up nothing.
+#[test]
+fn a_loop_that_goes_on_from_an_earlier_one_waits_some_seconds_for_a_leader_that_is_lost() {
+    let text = "title = \"two\"\nradius = 0.2\nlinks = { kind = \"nearest\", count = 1 }\n\
+                robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [0.0, 5.0] }]\n\
+                leaders = [{ robots = [\"a\", \"b\"], program = { kind = \"path\", points = [{ at = 4.0, displacement = [2.0, 0.0] }] } }]\n\
+                limits = { speed = 1.0, clearance = 0.1 }\ncontrol = { period = 0.1 }\n";
+    let swarm = Swarm::parse("two", "two.toml", text, &[], None).expect("a swarm");
+    let run = |control: &mut Control, from: usize, ticks: usize, lost: usize| {
+        for tick in from..from + ticks {
+            let now = tick as f64 * PERIOD;
+            for k in lost..2 {
+                let position = control.target(k).unwrap_or([0.0, 5.0 * k as f64]);
+                control
+                    .receive(k, Pose { position, yaw: 0.0, stamp: now, frame_is_right: true }, now)
+                    .expect("a pose");
+            }
+            control.tick(now);
+        }
+    };
+    let mut first = Control::new(&swarm).expect("laid out");
+    run(&mut first, 0, 10, 0);
+    let time = first.program_time();
+    let mut next = Control::new(&swarm).expect("laid out");
+    next.restore(first.kept());
+    run(&mut next, 10, 40, 1);
+    assert_eq!(next.program_time(), time, "it waits");
+    run(&mut next, 50, 60, 1);
+    assert!(next.program_time() > time + 3.0 && (next.target(1).expect("heard")[0] - 2.0).abs() < 1e-9);
+    let mut fresh = Control::new(&swarm).expect("laid out");
+    run(&mut fresh, 0, 100, 1);
+    assert_eq!(fresh.program_time(), 0.0, "before the beginning it waits for its leaders");
+}

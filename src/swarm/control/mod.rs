@@ -54,6 +54,9 @@ pub struct ControlSnapshot {
     /// Where members were last known to be \[m\].
     #[serde(default)]
     places: Vec<[f64; 2]>,
+    /// Whether the programs had begun.
+    #[serde(default)]
+    has_begun: bool,
 }
 
 impl ControlSnapshot {
@@ -108,6 +111,8 @@ pub struct Control {
     periods: u64,
     /// Whether every leader that the loop listens to has sent a pose, and the others have been waited for.
     begun: bool,
+    /// Whether they had begun in an earlier loop of which this is the continuation.
+    goes_on: bool,
     /// When all leaders had first been heard \[s\].
     led_since: Option<f64>,
     /// Members whose poses this loop receives.
@@ -159,6 +164,7 @@ impl Control {
             run_before: 0.0,
             periods: 0,
             begun: false,
+            goes_on: false,
             led_since: None,
             listens: vec![true; count],
             starts,
@@ -291,8 +297,7 @@ impl Control {
 
     /// The model of members that take time to brake.
     fn dynamics(&self) -> DoubleIntegrator {
-        let Limits { speed, acceleration, .. } = *self.filter.limits();
-        DoubleIntegrator { speed, acceleration }
+        DoubleIntegrator { speed: self.filter.own_speed(), acceleration: self.filter.limits().acceleration }
     }
 
     /// The velocity \[m/s\] with which a member that takes time to brake ends the next period on its way to a target \[m\];
@@ -360,6 +365,7 @@ impl Control {
             program_time: self.program_time(),
             periods: self.periods,
             leads: self.formation.kept_leads(),
+            has_begun: self.begun || self.goes_on,
             places: (0..self.formation.count())
                 .map(|member| self.watch.place(member).unwrap_or(self.starts[member].place))
                 .collect(),
@@ -371,6 +377,7 @@ impl Control {
     pub fn restore(&mut self, kept: ControlSnapshot) {
         (self.run_before, self.run, self.periods) = (kept.program_time, 0, kept.periods);
         self.formation.restore(kept.leads, kept.periods);
+        self.goes_on = kept.has_begun;
         for (member, place) in (0..self.starts.len()).zip(kept.places) {
             self.leave_at(member, place);
         }
@@ -585,7 +592,8 @@ impl Control {
         if awaited.peek().is_none() {
             return true;
         }
-        if awaited.any(|m| self.formation.leads(m)) {
+        // A leader that is lost on the way holds up no program, nor does it where an earlier loop had begun.
+        if !self.goes_on && awaited.any(|m| self.formation.leads(m)) {
             self.led_since = None;
             return false;
         }

@@ -174,6 +174,11 @@ impl Filter {
         self.limits.speed * period + before
     }
 
+    /// The speed that the members themselves keep to \[m/s\]: a lower limit of this node brings their targets nearer.
+    pub(in crate::swarm) fn own_speed(&self) -> f64 {
+        self.fastest
+    }
+
     /// Forgets the targets of the ticks before: others may move the members.
     pub(crate) fn forget(&mut self) {
         for member in 0..self.radii.len() {
