@@ -304,7 +304,8 @@ impl Mechanics {
             return None;
         }
         let of = if is_loaded { self.strain_energy } else { path.most() };
-        let missed = (done - self.strain_energy).abs() / of;
+        // What solvers leave out of balance is no matter of the parts.
+        let missed = ((done - self.strain_energy).abs() - path.unbalanced()) / of;
         (missed > MISSED_WORK && missed.is_finite()).then(|| {
             let missed = percent(missed);
             let off = match is_loaded {

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::Engine;
 use super::forces::Forces;
 use crate::flock::vectors::Vectors;
+use crate::geometry::point::{dot, plus};
 
 /// Forces at their last value times displacements \[force length\]. In equilibrium under small rotations the strain
 /// energy is half of the sum of both; in a body that turns this is no energy.
@@ -26,6 +27,7 @@ pub struct Path {
     done: Work,
     most: f64,
     largest_force: f64,
+    unbalanced: f64,
     last: Option<Acting>,
 }
 
@@ -53,14 +55,17 @@ impl Path {
         self.largest_force
     }
 
+    /// What the forces may have done that a tolerance left out of balance, sizes added up \[force length\].
+    pub fn unbalanced(&self) -> f64 {
+        self.unbalanced
+    }
+
     /// Adds the way to where the engine's body is at rest now.
     pub fn extend(&mut self, engine: &Engine) {
         let Some(forces) = Forces::of(engine) else { return };
-        let now = Acting {
-            supports: forces.supports(engine),
-            loads: forces.loads,
-            displacement: forces.displacement,
-        };
+        let supports = forces.supports(engine);
+        let left: Vectors = (0..supports.len()).map(|i| plus(forces.left_on(i), supports.get(i))).collect();
+        let now = Acting { supports, loads: forces.loads, displacement: forces.displacement };
         let rest = || Vectors::zeros(now.displacement.len());
         let unloaded = || Acting { loads: rest(), supports: rest(), displacement: rest() };
         let last = self.last.take().unwrap_or_else(unloaded);
@@ -71,11 +76,14 @@ impl Path {
                 let (f, g) = (before.get(i), after.get(i));
                 0.5 * ((f[0] + g[0]) * way[0] + (f[1] + g[1]) * way[1])
             };
-            (i, [work(&last.loads, &now.loads), work(&last.supports, &now.supports)])
+            let out_of_balance = dot(left.get(i), way).abs();
+            (i, [work(&last.loads, &now.loads), work(&last.supports, &now.supports), out_of_balance])
         };
-        let [loads, supports] = engine.sum_over([-0.0; 2], engine.body().owned().map(done));
+        let [loads, supports, unbalanced] =
+            engine.sum_over([-0.0, -0.0, 0.0], engine.body().owned().map(done));
         self.done.loads += loads;
         self.done.supports += supports;
+        self.unbalanced += unbalanced;
         self.most = self.most.max((self.done.loads + self.done.supports).abs());
         let force = |i: usize| [&now.loads, &now.supports].map(|of| of.get(i).map(f64::abs)).concat();
         let own = engine.body().owned().flat_map(force).fold(0.0, f64::max);
