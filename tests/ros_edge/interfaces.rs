@@ -134,7 +134,7 @@ fn velocities_lead_robots_with_late_poses_to_their_targets() {
         let (then, mut places) = been.last().expect("the start").clone();
         for ((velocities, _, twist), place) in robots.iter_mut().zip(&mut places) {
             *place = [place[0] + (now - then) * twist.linear.x, place[1] + (now - then) * twist.linear.y];
-            *twist = velocities.take_last().map_or_else(|| twist.clone(), |(twist, _)| twist);
+            *twist = velocities.take_last().map_or(*twist, |(twist, _)| twist);
         }
         been.push((now, places.clone()));
         if let Some((stamp, late)) = been.iter().rfind(|(then, _)| *then <= now - LATE) {
