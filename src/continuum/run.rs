@@ -263,8 +263,10 @@ fn divergence(engine: &Engine, movement: &Movement, bound: f64) -> Option<Diverg
     } else {
         return None;
     };
-    // A body that is put to rest at once has not moved.
-    let is_swept = movement.largest_move > 0.0 || !movement.is_finite;
+    // A body that is put to rest at once has not moved, and a leader goes by no rule.
+    let leads = |i: usize| engine.roles()[i] == Role::Leader && engine.body().id(i) == particle;
+    let is_led = engine.count_of_parts(engine.body().owned().filter(|&i| leads(i)).count()) > 0;
+    let is_swept = (movement.largest_move > 0.0 || !movement.is_finite) && !is_led;
     let likely_cause = is_swept.then(|| cause_in_sweep(engine)).flatten().unwrap_or_else(|| {
         let cause = match engine.whole_load() {
             Some(_) => "the loads move the body that far; check them and the stiffness of the material",
@@ -280,12 +282,14 @@ fn cause_in_sweep(engine: &Engine) -> Option<String> {
     let rule = engine.flock().rule;
     let damping = engine.update().damping;
     let overshoot = rule.feedback.map(|f| (f.factor, f.reference));
-    if let Some((factor, FeedbackReference::Initial)) = overshoot {
+    if let Some((factor, FeedbackReference::Initial)) =
+        overshoot.filter(|(factor, _)| !(-2.0..=0.0).contains(factor))
+    {
         return Some(format!(
             "feedback factor {factor}: the sweep grows once |1 + factor| times its spectral radius exceeds 1; bring the factor closer to 0"
         ));
     }
-    if let Some((factor, FeedbackReference::Previous)) = overshoot {
+    if let Some((factor, FeedbackReference::Previous)) = overshoot.filter(|(factor, _)| *factor > 0.0) {
         return Some(format!(
             "over-relaxation by 1 + {factor} in a synchronous update; bring the factor below 0"
         ));
@@ -293,7 +297,7 @@ fn cause_in_sweep(engine: &Engine) -> Option<String> {
     if damping > 1.0 {
         return Some(format!("damping = {damping} overshoots every target; use at most 1"));
     }
-    if let Some(poisson) = rule.poisson {
+    if let Some(poisson) = rule.poisson.filter(|poisson| poisson.k != 0.0) {
         let (low, high) = engine.body().bounds();
         let (across, name) = match poisson.axis {
             Axis::X => (1, "y"),
@@ -317,11 +321,12 @@ fn cause_in_sweep(engine: &Engine) -> Option<String> {
             )
         });
     }
-    if matches!(rule.mean, Mean::Distance { .. }) && is_synchronous {
+    if matches!(rule.mean, Mean::Distance { power } if power > 0.0) && is_synchronous {
         return Some("weights that grow with distance are marginal in a synchronous update; use update.order = \"sequential\" or update.damping = 0.5".into());
     }
-    let is_weighted = matches!(engine.flock().weights, Weights::Scalar(_));
-    is_weighted.then(|| "weights of both signs; give weights that are not negative".into())
+    let are_of_both_signs = matches!(&engine.flock().weights, Weights::Scalar(weights) if weights.iter().any(|weight| *weight < 0.0));
+    let are_of_both_signs = engine.count_of_parts(usize::from(are_of_both_signs)) > 0;
+    are_of_both_signs.then(|| "weights of both signs; give weights that are not negative".into())
 }
 
 /// Whether the followers' next moves go against their last ones: waves that grow from step to step change their sign at

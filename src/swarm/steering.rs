@@ -47,9 +47,16 @@ impl Steering {
     /// The velocity of a member towards its target \[m\] from the last tick on, zero without one.
     pub fn next(&mut self, control: &Control, member: usize, target: Option<[f64; 2]>) -> Velocity {
         let now = control.now();
-        if let Some(pose) = control.watch().pose(member) {
-            self.see(pose, control.limits(), control.period());
-            self.forget(pose.stamp, now);
+        match control.watch().pose(member) {
+            Some(pose) => {
+                self.see(pose, control.limits(), control.period());
+                self.forget(pose.stamp, now);
+            }
+            // Where it is when it is heard again its pose alone will say.
+            None => (self.last, self.target) = (None, None),
+        }
+        if self.last.is_none() {
+            self.sent.clear();
         }
         let velocity = target.and_then(|target| self.towards(control, member, target)).unwrap_or_default();
         self.sent.push_back((now, velocity));
@@ -330,6 +337,12 @@ mod tests {
             squares[0] += (velocity.ahead.powi(2) + velocity.left.powi(2)) / f64::from(2 * ticks);
             squares[1] += (place[0].powi(2) + place[1].powi(2)) / f64::from(2 * ticks);
         }
+        for tick in ticks..2 * ticks {
+            control.tick(f64::from(tick) * PERIOD);
+            let driven = steering.next(&control, 0, control.target(0));
+            assert!(driven == Velocity::default() || tick < ticks + 20, "one that is lost stands");
+        }
+        assert_eq!(steering.sent.len(), 1, "nothing is kept of one that is lost");
         let [speed, off] = squares.map(f64::sqrt);
         assert!(speed < 0.5 * NOISE / PERIOD && off < 0.6 * NOISE, "{speed} m/s, {off} m");
     }

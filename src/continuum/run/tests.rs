@@ -245,3 +245,24 @@ fn the_digest_distinguishes_plans_by_what_a_run_depends_on() {
         assert_ne!(plain, of(&[other]), "{other}");
     }
 }
+
+/// Neither is a term of the rule that cannot grow.
+#[test]
+fn a_rule_is_not_blamed_for_a_leader_that_leaves_the_body_behind() {
+    for rule in [
+        "rule.feedback={factor=-0.05}",
+        "rule.feedback={factor=-0.1,reference=\"previous\"}",
+        "rule.mean={kind=\"distance\",power=-1.0}",
+        "rule.mean={kind=\"distance\",power=1.0}",
+        "rule.poisson={k=0.0}",
+        "rule.poisson={k=-0.3}",
+    ] {
+        let scene = scene("tension", &["stop.divergence_ratio=0.01", rule]);
+        let outcome = run(plan(&scene), &mut |_, _| ControlFlow::Continue(()));
+        let StopReason::Diverged(divergence) = outcome.reason else { panic!("{rule}: {:?}", outcome.reason) };
+        assert!(
+            divergence.likely_cause.starts_with("a leader leaves the body behind"),
+            "{rule}: {divergence:?}"
+        );
+    }
+}
