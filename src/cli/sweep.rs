@@ -354,8 +354,11 @@ fn merge(arguments: &SweepArguments, start: Instant) -> Result<ExitCode, Refusal
     }
     let (count, first) = (missing.len(), missing[0]);
     note!(
-        "{count} runs are missing, the first is run {first}: `flockform sweep --resume {}` makes them",
-        out.display()
+        "{} {} missing, the first is run {first}: `flockform sweep --resume {}` makes {}",
+        counted(count, "run"),
+        if count == 1 { "is" } else { "are" },
+        out.display(),
+        if count == 1 { "it" } else { "them" }
     );
     Ok(ExitCode::from(FAILED))
 }

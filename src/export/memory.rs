@@ -3,10 +3,14 @@
 //! taken and given back before the plan was made, by the finite elements of a truth that leads or a setting that was chosen.
 
 use super::figures::axes::Axes;
+use super::figures::page::Bounds;
 use super::figures::{Formats, PNG_ZOOM, components, is_raster, page, panels};
 use super::report::recorder::{Packed, packed};
 use crate::continuum::memory::{measured, on_the_way, solving, stepped};
 use crate::continuum::plan::Plan;
+use crate::engine::setup::RoleChange;
+use crate::flock::role::Role;
+use crate::geometry::point::plus;
 use crate::material::cells::Cells;
 use crate::material::stress::StressState;
 use crate::scene::Scene;
@@ -133,6 +137,34 @@ pub fn of_part(
         + shown
 }
 
+/// Corners of the whole body before it is deformed \[length\].
+fn undeformed(plan: &Plan) -> Bounds {
+    let body = &plan.setup.body;
+    let (low, high) = match &body.part {
+        Some(_) => body.bounds(),
+        None => body.reference.bounds(0..plan.count()).unwrap_or_default(),
+    };
+    [low, high]
+}
+
+/// Corners of where leaders are when figures are drawn, as far as their first programs say \[length\]; where followers go, the run
+/// alone shows.
+fn led(scene: &Scene, plan: &Plan) -> Option<Bounds> {
+    let drawn = scene.record.figures.iter().copied().chain([plan.stop.steps]);
+    let steps: &Vec<usize> = &drawn.filter(|&step| step <= plan.stop.steps).collect();
+    let changes = plan.setup.changes.iter().filter(|change| change.role == Role::Leader);
+    let motions = changes.filter_map(|change| Some((change, change.motion.as_ref()?)));
+    let places = motions.flat_map(|(RoleChange { particles, from, .. }, motion)| {
+        let led = particles.iter().map(|&particle| plan.setup.body.reference.get(particle)).enumerate();
+        led.flat_map(move |(which, base)| {
+            let since = from.saturating_sub(1);
+            let begun = steps.iter().filter(move |&&step| step > since);
+            begun.map(move |step| plus(base, motion.displacement((step - since) as f64, which, base)))
+        })
+    });
+    places.map(|place| [place; 2]).fold(None, |all, one| page::around_both(all, Some(one)))
+}
+
 /// Bytes of what the figures of so many steps are while they are drawn, as many at once as there are threads.
 fn pictures(scene: &Scene, plan: &Plan, moments: usize) -> usize {
     /// Memory of the renderer with its fonts; that of one more at the same time.
@@ -150,12 +182,8 @@ fn pictures(scene: &Scene, plan: &Plan, moments: usize) -> usize {
     const CHART: f64 = 560.0;
     let bytes = |[width, height]: [f64; 2]| 4 * (f64::from(PNG_ZOOM).powi(2) * width * height) as usize;
     let body = &plan.setup.body;
-    // As it lies before it is deformed.
-    let (low, high) = match &body.part {
-        Some(_) => body.bounds(),
-        None => body.reference.bounds(0..plan.count()).unwrap_or_default(),
-    };
-    let (bounds, spacing) = (Some([low, high]), body.lattice.spacing());
+    let (bounds, spacing) =
+        (page::around_both(Some(undeformed(plan)), led(scene, plan)), body.lattice.spacing());
     let axes = page::around(bounds, spacing);
     let sheet = bytes([page::width_of(&axes, BAR), ABOVE + axes.size[1] + Axes::BELOW]);
     let has_cells = plan.setup.cells.is_some();
