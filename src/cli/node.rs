@@ -146,7 +146,11 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
             node.watch_middleware().map_err(NodeError::from)?;
             let well = node.run_while(interrupted, &mut |node| {
                 page.iter().for_each(|page| page.feed.offer(node.control()));
-                life.send(|| Left { node: node.kept(), page: page.as_ref().map(|page| page.place.clone()) })
+                let has_changed = node.has_changed();
+                life.send(has_changed, || Left {
+                    node: node.kept(),
+                    page: page.as_ref().map(|page| page.place.clone()),
+                })
             });
             live::close(page.and_then(|page| page.door));
             // An interrupt is the end of every node: lost output is no news of it, but an error of its own.
@@ -317,7 +321,9 @@ pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCod
                 robots.restore(&left);
             }
             robots.watch_middleware().map_err(NodeError::from)?;
-            return Ok(ended(robots.run_while(interrupted, &mut |robots| life.send(|| robots.kept()))));
+            return Ok(ended(
+                robots.run_while(interrupted, &mut |robots| life.send(false, || robots.kept())),
+            ));
         }
         None if arguments.node_per_robot => return Err(Refusal::NoNodes),
         None => {

@@ -58,6 +58,8 @@ pub struct Life {
     /// The part of the last state that has not been sent yet.
     unsent: Vec<u8>,
     sent: Option<Instant>,
+    /// Whether the next state is not to wait until it is due.
+    is_urgent: bool,
 }
 
 /// Runs this program again as a child, and another whenever one ends for no reason of its own; returns in the child,
@@ -214,7 +216,15 @@ impl Life {
             tracing::warn!("what the processes before this one left cannot be read ({error}): starting anew");
             (None, Value::Null)
         });
-        Ok(Self { number, socket: Some(socket), text, left, unsent: Vec::new(), sent: None })
+        Ok(Self {
+            number,
+            socket: Some(socket),
+            text,
+            left,
+            unsent: Vec::new(),
+            sent: None,
+            is_urgent: false,
+        })
     }
 
     /// From 1.
@@ -232,9 +242,10 @@ impl Life {
         })
     }
 
-    /// Sends the state if it is due. Returns false if the socket is closed: the process should end.
-    pub fn send<T: Serialize>(&mut self, state: impl FnOnce() -> T) -> bool {
-        if self.sent.is_some_and(|sent| sent.elapsed() < SEND_PERIOD) {
+    /// Sends the state if it is due, or has changed by a command. Returns false if the socket is closed: the process should end.
+    pub fn send<T: Serialize>(&mut self, has_changed: bool, state: impl FnOnce() -> T) -> bool {
+        self.is_urgent |= has_changed;
+        if !self.is_urgent && self.sent.is_some_and(|sent| sent.elapsed() < SEND_PERIOD) {
             return true;
         }
         let Some(socket) = &mut self.socket else { return true };
@@ -242,7 +253,7 @@ impl Life {
         if self.unsent.is_empty()
             && let Ok(line) = serde_json::to_vec(&state())
         {
-            self.unsent = line;
+            (self.unsent, self.is_urgent) = (line, false);
             self.unsent.push(b'\n');
         }
         let goes_on =

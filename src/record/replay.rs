@@ -305,6 +305,11 @@ impl Replay {
 
     fn event(&mut self, event: &LoopEvent) {
         let text = &event.text;
+        let commands =
+            [LoopEvent::EMERGENCY_STOP, LoopEvent::RESUME, LoopEvent::MANOEUVRE, LoopEvent::POSTURE];
+        if commands.contains(&event.kind) {
+            self.take_over();
+        }
         match (event.kind, &event.values[..]) {
             (LoopEvent::TICK, &[now]) => self.tick(now),
             (LoopEvent::ACTIVE, _) => {
@@ -331,6 +336,13 @@ impl Replay {
             (LoopEvent::PARAMETER, &[value]) => self.parameter(text, value),
             (LoopEvent::CONFIGURE, _) => self.begin_anew(),
             _ => {}
+        }
+    }
+
+    /// Goes on from the state of an earlier loop, as the node does before anything is asked of it.
+    fn take_over(&mut self) {
+        if let Some(state) = self.taken_over.take() {
+            self.control.restore(state);
         }
     }
 
@@ -378,9 +390,7 @@ impl Replay {
     fn tick(&mut self, now: f64) {
         self.compare();
         self.begun = true;
-        if let Some(state) = self.taken_over.take() {
-            self.control.restore(state);
-        }
+        self.take_over();
         if !self.active {
             self.control.set_active(false);
         } else if !self.has_events {

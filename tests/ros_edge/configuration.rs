@@ -1,15 +1,17 @@
 //! What `configure` opens and `cleanup` closes.
 
+use std::sync::mpsc::{channel, sync_channel};
+
 use flockform::flock::vectors::distance;
 use flockform::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
-use flockform::messages::flockform_msgs::FormationState;
+use flockform::messages::flockform_msgs::{FormationState, SetFormation, SetFormationRequest};
 use flockform::messages::geometry_msgs::PoseStamped;
 use flockform::messages::rcl_interfaces::{Parameter, SetParameters, Settings};
 use flockform::record::replay::replay_file;
 use flockform::record::{About, Recording, Shared};
 use flockform::ros::edge::Quality;
 use flockform::ros::edge::parameters::Value;
-use flockform::ros::node::FormationNode;
+use flockform::ros::node::{CommandQueue, FormationNode, NodeCommand};
 use flockform::ros::robots::{Layout, RobotNodes};
 use flockform::swarm::control::{Control, Mode};
 use ros2_client::ServiceMapping;
@@ -127,6 +129,7 @@ fn a_recording_with_a_cleanup_in_it_replays_to_the_bit() {
     assert!(report.robots.iter().all(|robot| robot.recorded > 30), "{:?}", report.robots);
 }
 
+/// What is asked of it before its first tick comes after what it takes over.
 #[test]
 fn a_recording_of_a_process_that_goes_on_where_another_ended_replays_to_the_bit() {
     let _peers = peers();
@@ -137,6 +140,12 @@ fn a_recording_of_a_process_that_goes_on_where_another_ended_replays_to_the_bit(
     let mut swarm = Swarming::open(&file, &[]);
     swarm.until_all_are_heard();
     swarm.fly_until("the leaders are under way", |swarm| swarm.node.control().program_time() > 0.3);
+    let (ask, commands) = channel();
+    let (answers, _answers) = sync_channel(4);
+    swarm.node.take_commands(CommandQueue { commands, answers });
+    ask.send((1, NodeCommand::EmergencyStop)).expect("taken");
+    swarm.fly_until("it is stopped", |swarm| swarm.node.control().mode() == Mode::EmergencyStopped);
+    assert!(swarm.node.has_changed() && !swarm.node.has_changed(), "the next process is to know at once");
     let kept = swarm.node.kept();
     drop(swarm);
     let taken_over = Some(kept.control().clone());
@@ -145,6 +154,10 @@ fn a_recording_of_a_process_that_goes_on_where_another_ended_replays_to_the_bit(
     let mut swarm = Swarming::open(&file, &[]);
     swarm.node.record(recording.sink()).expect("named");
     swarm.node.restore(kept);
+    let (ask, commands) = channel();
+    let (answers, _answers) = sync_channel(4);
+    swarm.node.take_commands(CommandQueue { commands, answers });
+    ask.send((1, NodeCommand::Resume)).expect("taken");
     swarm.until_all_are_heard();
     swarm.fly_until("the leaders go on", |swarm| swarm.node.control().program_time() > 0.6);
     drop(swarm);
@@ -266,4 +279,27 @@ fn a_recording_s_overrides_name_the_topics_that_the_parameters_gave() {
     recording.take().expect("open").finish().expect("whole");
     let report = replay_file(&path, Some(renamed), &[], 0.0).expect("readable");
     assert!(report.poses > 25, "{}", report.poses);
+}
+
+/// As a client sends again what a server that died has not acknowledged.
+#[test]
+fn what_was_asked_of_an_earlier_node_is_not_done_again() {
+    let mut peers = peers();
+    let file = square(&[&PATIENT[..], &["leaders[0].program={ kind = \"external\" }"]].concat());
+    let mut swarm = Swarming::open(&file, &[]);
+    let client = client::<SetFormation>(&mut peers, MAPPING, "/flockform/set_formation");
+    swarm.until_all_are_heard();
+    let request =
+        SetFormationRequest { translate: [0.5, 0.0], duration: 2.0, ..SetFormationRequest::default() };
+    let answer = call::<SetFormation>(&client, &request, &mut || swarm.tick());
+    assert!(answer.success, "{}", answer.message);
+    drop(swarm);
+    let mut swarm = Swarming::open(&file, &[]);
+    swarm.until_all_are_heard();
+    for _ in 0..200 {
+        swarm.tick();
+        assert_eq!(swarm.node.control().formation().programs_end(), 0.0, "nothing leads them");
+    }
+    let answer = call::<SetFormation>(&client, &request, &mut || swarm.tick());
+    assert!(answer.success, "{}", answer.message);
 }

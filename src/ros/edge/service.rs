@@ -10,7 +10,7 @@ use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::marker::PhantomData;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use ros2_client::RmwRequestId;
 use ros2_client::dds::rustdds::rpc::SampleIdentity;
@@ -56,6 +56,8 @@ pub struct Service<S: ServiceType> {
     shared: Arc<Shared>,
     waiting: RefCell<VecDeque<Waiting<S::Request>>>,
     refused: Cell<u64>,
+    /// Time before which no request counts, by the clock of the system \[s\].
+    from: Option<f64>,
     kind: PhantomData<S>,
 }
 
@@ -72,7 +74,15 @@ impl<S: ServiceType> Service<S> {
 
     pub(super) fn new(name: String, reader: Reader, outlet: Arc<Outlet>, shared: Arc<Shared>) -> Self {
         let waiting = RefCell::new(VecDeque::new());
-        Self { name, reader, outlet, shared, waiting, refused: Cell::new(0), kind: PhantomData }
+        Self { name, reader, outlet, shared, waiting, refused: Cell::new(0), from: None, kind: PhantomData }
+    }
+
+    /// Refuses what was sent before now. A client keeps what a server that died has not acknowledged, and sends it to the next one,
+    /// which would do again what was done long ago.
+    #[must_use]
+    pub fn from_now_on(self) -> Self {
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |time| time.as_secs_f64());
+        Self { from: Some(now), ..self }
     }
 
     /// The next request and its client, or none. Payloads that are no request are skipped and counted.
@@ -97,6 +107,13 @@ impl<S: ServiceType> Service<S> {
                 }
                 Taken::Sample(sample) => sample,
             };
+            let before = self.from.zip(sample.stamps.sent).map_or(0.0, |(from, sent)| from - sent);
+            if before > 0.0 {
+                self.refuse(&format!(
+                    "it was sent {before:.1} s before this server began, to an earlier one or by a clock that is behind"
+                ));
+                continue;
+            }
             match read::<S::Request>(&sample.payload, sample.identity, sample.related) {
                 Ok((id, request)) => {
                     let client = prefix(GUID::from(sample.identity.writer_gid));

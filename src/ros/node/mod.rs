@@ -16,6 +16,7 @@ pub(super) mod settings;
 mod transitions;
 pub(super) mod uses;
 
+use std::cell::Cell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
@@ -83,6 +84,8 @@ pub struct FormationNode {
     is_configured: Arc<AtomicBool>,
     /// Whether the loop has begun anew since the last tick; it is recorded.
     is_new: bool,
+    /// Whether a command has changed what outlasts the process since that was last asked.
+    is_changed: Cell<bool>,
     /// Gets a copy of what goes through; with the topics while there are any.
     recorder: Option<MessageRecorder>,
     diagnostics: Publisher<DiagnosticArray>,
@@ -135,8 +138,8 @@ impl FormationNode {
             stop_requests: stop_topic
                 .map(|topic| node.subscription(&topic, Quality::reliable(1)))
                 .transpose()?,
-            resume: node.service(&service("resume")?)?,
-            set_formation: node.service(&service("set_formation")?)?,
+            resume: node.service(&service("resume")?)?.from_now_on(),
+            set_formation: node.service(&service("set_formation")?)?.from_now_on(),
             queue: None,
             descriptions: raw
                 .serves(RawService::TypeDescription)
@@ -147,6 +150,7 @@ impl FormationNode {
             endpoints: None,
             is_configured,
             is_new: false,
+            is_changed: Cell::new(false),
             recorder: None,
             diagnostics: node.publisher(&names.topic("/diagnostics")?, Quality::reliable(5))?,
             statistics: Statistics::default(),
@@ -388,6 +392,7 @@ impl FormationNode {
     }
 
     fn answer(&mut self, now: f64) {
+        let was_active = self.was_active;
         let allowed = self.origin.swarm.raw.node.commands;
         let may_switch = |edge: &Transition| {
             allowed.may_do_all() || (allowed.may_stop() && ["deactivate", "shutdown"].contains(&edge.label))
@@ -456,9 +461,17 @@ impl FormationNode {
             let answer = answer.unwrap_or_else(|| commanded.perform(&command));
             self.queue.iter().for_each(|queue| drop(queue.answers.try_send((number, answer.clone()))));
         }
+        let is_active = self.lifecycle.is_active();
+        let is_changed = is_active != was_active || !changes.is_empty() || !commanded.events.is_empty();
+        self.is_changed.set(self.is_changed.get() || is_changed);
         for (kind, text, values) in commanded.events {
             self.record_event(now, kind, &text, &values);
         }
+    }
+
+    /// Whether a command has changed what outlasts the process since this was last asked.
+    pub fn has_changed(&self) -> bool {
+        self.is_changed.take()
     }
 
     /// Problems of the network around the node, and of its clock.

@@ -24,7 +24,7 @@ struct Services {
 impl Services {
     fn new(node: &Node) -> Result<Self, EdgeError> {
         Ok(Self {
-            changes: node.service(&node.private("change_state")?)?,
+            changes: node.service(&node.private("change_state")?)?.from_now_on(),
             state: node.service(&node.private("get_state")?)?,
             states: node.service(&node.private("get_available_states")?)?,
             transitions: node.service(&node.private("get_available_transitions")?)?,

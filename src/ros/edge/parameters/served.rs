@@ -33,8 +33,8 @@ impl Services {
             types: node.service(&node.private("get_parameter_types")?)?,
             describe: node.service(&node.private("describe_parameters")?)?,
             list: node.service(&node.private("list_parameters")?)?,
-            set: node.service(&node.private("set_parameters")?)?,
-            set_atomically: node.service(&node.private("set_parameters_atomically")?)?,
+            set: node.service(&node.private("set_parameters")?)?.from_now_on(),
+            set_atomically: node.service(&node.private("set_parameters_atomically")?)?.from_now_on(),
             events: node.publisher(&node.topic("/parameter_events")?, Quality::reliable(1000))?,
         })
     }
