@@ -4,7 +4,7 @@ use std::sync::mpsc::{channel, sync_channel};
 
 use flockform::flock::vectors::distance;
 use flockform::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
-use flockform::messages::flockform_msgs::{FormationState, SetFormation, SetFormationRequest};
+use flockform::messages::flockform_msgs::FormationState;
 use flockform::messages::geometry_msgs::PoseStamped;
 use flockform::messages::rcl_interfaces::{Parameter, SetParameters, Settings};
 use flockform::record::replay::replay_file;
@@ -279,27 +279,4 @@ fn a_recording_s_overrides_name_the_topics_that_the_parameters_gave() {
     recording.take().expect("open").finish().expect("whole");
     let report = replay_file(&path, Some(renamed), &[], 0.0).expect("readable");
     assert!(report.poses > 25, "{}", report.poses);
-}
-
-/// As a client sends again what a server that died has not acknowledged.
-#[test]
-fn what_was_asked_of_an_earlier_node_is_not_done_again() {
-    let mut peers = peers();
-    let file = square(&[&PATIENT[..], &["leaders[0].program={ kind = \"external\" }"]].concat());
-    let mut swarm = Swarming::open(&file, &[]);
-    let client = client::<SetFormation>(&mut peers, MAPPING, "/flockform/set_formation");
-    swarm.until_all_are_heard();
-    let request =
-        SetFormationRequest { translate: [0.5, 0.0], duration: 2.0, ..SetFormationRequest::default() };
-    let answer = call::<SetFormation>(&client, &request, &mut || swarm.tick());
-    assert!(answer.success, "{}", answer.message);
-    drop(swarm);
-    let mut swarm = Swarming::open(&file, &[]);
-    swarm.until_all_are_heard();
-    for _ in 0..200 {
-        swarm.tick();
-        assert_eq!(swarm.node.control().formation().programs_end(), 0.0, "nothing leads them");
-    }
-    let answer = call::<SetFormation>(&client, &request, &mut || swarm.tick());
-    assert!(answer.success, "{}", answer.message);
 }

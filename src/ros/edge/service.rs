@@ -328,6 +328,51 @@ mod tests {
         assert_eq!(reply(Mark::Cyclone([0; HEADER]), 65_000), Ok(()));
     }
 
+    /// As clients send what a server that died has not acknowledged.
+    #[test]
+    fn what_was_asked_before_a_service_began_is_refused_where_it_changes_something() {
+        use crate::messages::std_srvs::Trigger;
+        let domain = 100 + (std::process::id() % 101) as u16;
+        let options = crate::ros::edge::Options { domain, loopback_only: true };
+        let [ours, theirs] = [(); 2].map(|()| crate::ros::edge::Edge::open(options).expect("sockets"));
+        let [ours, theirs] =
+            [(&ours, "ours"), (&theirs, "theirs")].map(|(edge, name)| edge.node("/", name).expect("a node"));
+        let reads = ours.service::<Trigger>("/asked/to_read").expect("a service");
+        let changes = ours.service::<Trigger>("/asked/to_change").expect("a service").from_now_on();
+        let shared = theirs.service::<Trigger>("/asked/nothing").expect("a service").shared;
+        let client = |of: &Service<Trigger>| {
+            let [requests, _] = crate::ros::edge::names::dds_service(of.name());
+            let [kind, _] = crate::ros::edge::names::dds_service_types(Trigger::PACKAGE, Trigger::NAME);
+            let writer = shared.writer(&requests, &kind, Service::<Trigger>::QUALITY).expect("a writer");
+            Outlet::new(of.name(), writer, 10, None)
+        };
+        let ask = |client: &Arc<Outlet>, ago: u64| {
+            let mut bytes = Vec::new();
+            encode(&<Trigger as ServiceType>::Request::default(), &mut bytes).expect("encodes");
+            let sent = Timestamp::from_ticks(Timestamp::now().to_ticks() - (ago << 32));
+            let options = WriteOptionsBuilder::new().source_timestamp(sent).build();
+            shared.outbox.post(client, Payload { order: Order::Little, bytes }, options).expect("sent");
+        };
+        for (service, is_done) in [(&reads, true), (&changes, false)] {
+            let client = client(service);
+            let since = Instant::now();
+            let mut done = 0;
+            while done == 0 && service.refused() == 0 {
+                assert!(since.elapsed() < Duration::from_secs(20), "{}: nothing came", service.name());
+                ask(&client, 60);
+                std::thread::sleep(Duration::from_millis(50));
+                done += usize::from(service.take().is_some());
+            }
+            assert_eq!(done > 0, is_done, "{}", service.name());
+            ask(&client, 0);
+            let since = Instant::now();
+            while service.take().is_none() {
+                assert!(since.elapsed() < Duration::from_secs(20), "{}: a new one is taken", service.name());
+                std::thread::sleep(Duration::from_millis(50));
+            }
+        }
+    }
+
     #[test]
     fn a_request_that_names_no_reader_is_answered_to_its_writer() {
         let payload = little_endian(vec![0; 32]);
