@@ -305,8 +305,9 @@ impl Mechanics {
         }
         let of = if is_loaded { self.strain_energy } else { path.most() };
         // What solvers leave out of balance is no matter of the parts.
-        let missed = ((done - self.strain_energy).abs() - path.unbalanced()) / of;
-        (missed > MISSED_WORK && missed.is_finite()).then(|| {
+        let difference = (done - self.strain_energy).abs();
+        let (missed, by_parts) = (difference / of, (difference - path.unbalanced()) / of);
+        (by_parts > MISSED_WORK && by_parts.is_finite()).then(|| {
             let missed = percent(missed);
             let off = match is_loaded {
                 true => format!("differs by {missed} from the strain energy, which holds"),

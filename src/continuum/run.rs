@@ -289,9 +289,11 @@ fn cause_in_sweep(engine: &Engine) -> Option<String> {
             "feedback factor {factor}: the sweep grows once |1 + factor| times its spectral radius exceeds 1; bring the factor closer to 0"
         ));
     }
-    if let Some((factor, FeedbackReference::Previous)) = overshoot.filter(|(factor, _)| *factor > 0.0) {
+    if let Some((factor, FeedbackReference::Previous)) =
+        overshoot.filter(|(factor, _)| !(-1.0..=0.0).contains(factor))
+    {
         return Some(format!(
-            "over-relaxation by 1 + {factor} in a synchronous update; bring the factor below 0"
+            "over-relaxation by 1 + {factor} in a synchronous update; bring the factor between -1 and 0"
         ));
     }
     if damping > 1.0 {

@@ -36,7 +36,12 @@ pub struct Steering {
     last: Option<Pose>,
     /// Its last target \[m\].
     target: Option<[f64; 2]>,
+    /// Direction in which that lay \[rad\].
+    bearing: Option<f64>,
 }
+
+/// Velocities that are kept: older ones are of a robot that has long been lost.
+const MOST_SENT: usize = 1024;
 
 impl Steering {
     /// Of a robot that turns no faster than `turn_rate` \[rad/s\] and cannot go sideways; `None` of one that can.
@@ -49,16 +54,19 @@ impl Steering {
         let now = control.now();
         match control.watch().pose(member) {
             Some(pose) => {
-                self.see(pose, control.limits(), control.period());
+                self.see(pose, control.limits());
                 self.forget(pose.stamp, now);
             }
             // Where it is when it is heard again its pose alone will say.
-            None => (self.last, self.target) = (None, None),
+            None => (self.last, self.target, self.bearing) = (None, None, None),
         }
         if self.last.is_none() {
             self.sent.clear();
         }
         let velocity = target.and_then(|target| self.towards(control, member, target)).unwrap_or_default();
+        if self.sent.len() == MOST_SENT {
+            self.sent.pop_front();
+        }
         self.sent.push_back((now, velocity));
         self.target = target;
         velocity
@@ -66,11 +74,11 @@ impl Steering {
 
     /// Takes in a pose. That of the noise which is declared is weighed against where the velocities have led since the one before,
     /// from which a robot is taken to stray by a part of its way: a step of the Kalman filter of such a walk, once it is steady.
-    fn see(&mut self, pose: Pose, limits: &Limits, period: f64) {
+    fn see(&mut self, pose: Pose, limits: &Limits) {
         /// What a robot strays from where it is driven, over its way \[1\].
         const SLIP: f64 = 0.1;
         /// Deviations beyond which a pose is no noise \[1\].
-        const MOST: f64 = 6.0;
+        const MOST: f64 = 4.0;
         let Some(last) = self.last.filter(|last| last.stamp < pose.stamp) else {
             let is_old = self.last.is_some_and(|last| last.stamp == pose.stamp);
             self.last = if is_old { self.last } else { Some(pose) };
@@ -78,9 +86,9 @@ impl Steering {
         };
         let (expected, _) = self.carried((last.position, last.yaw), last.stamp, pose.stamp);
         let off = minus(pose.position, expected);
-        let ratio = SLIP * limits.speed * period / limits.deviation;
+        let ratio = SLIP * limits.speed * (pose.stamp - last.stamp) / limits.deviation;
         let gain = if ratio.is_finite() && f64::hypot(off[0], off[1]) <= MOST * limits.deviation {
-            ratio * (ratio.hypot(2.0) - ratio) / 2.0
+            2.0 * ratio / (ratio.hypot(2.0) + ratio)
         } else {
             1.0
         };
@@ -88,10 +96,10 @@ impl Steering {
         self.last = Some(Pose { position, ..pose });
     }
 
-    /// Forgets velocities that were over at a pose of this time \[s\], and all of them where the clock has been set back.
+    /// Forgets velocities that were over at a pose of this time \[s\], and those of times that a clock set back has yet to come to.
     fn forget(&mut self, stamp: f64, now: f64) {
-        if self.sent.back().is_some_and(|&(from, _)| from > now) {
-            self.sent.clear();
+        while self.sent.back().is_some_and(|&(from, _)| from > now) {
+            self.sent.pop_back();
         }
         while self.sent.get(1).is_some_and(|&(next, _)| next <= stamp) {
             self.sent.pop_front();
@@ -99,7 +107,8 @@ impl Steering {
     }
 
     /// That of a member that takes time to brake is to end the period on its way to where it comes to rest, far ahead.
-    fn towards(&self, control: &Control, member: usize, target: [f64; 2]) -> Option<Velocity> {
+    fn towards(&mut self, control: &Control, member: usize, target: [f64; 2]) -> Option<Velocity> {
+        let bearing = self.bearing.take();
         let (period, limits) = (control.period(), control.limits());
         // What stops at once stands wherever it is by now, of which nothing else is sure.
         let stands = !limits.brakes && limits.acceleration.is_infinite();
@@ -119,7 +128,12 @@ impl Steering {
             let share = share(way, minus(target, self.target.unwrap_or(here)), gain);
             way.map(|x| share * x / period)
         });
-        Some(within(velocity, yaw, (period, gain), limits.speed, self.turn_rate))
+        self.bearing = (velocity != [0.0; 2]).then(|| velocity[1].atan2(velocity[0]));
+        let swung = self
+            .bearing
+            .zip(bearing)
+            .map_or(0.0, |(now, before)| (now - before).sin().atan2((now - before).cos()));
+        Some(within(velocity, (yaw, swung), (period, gain), limits.speed, self.turn_rate))
     }
 
     /// The place \[m\] and heading \[rad\] to which the velocities sent have led from those at `stamp` until `now` \[s\].
@@ -150,11 +164,11 @@ fn share(way: [f64; 2], moved: [f64; 2], gain: f64) -> f64 {
     if share.is_finite() && gain < 1.0 { share.clamp(0.0, 1.0) } else { 1.0 }
 }
 
-/// The command of a robot that is to go on with a velocity \[m/s, world frame\] for a period \[s\], in which it makes up for this part
-/// of what it heads aside.
+/// The command of a robot that is to go on with a velocity \[m/s, world frame\] for a period \[s\], in which it turns as far as that has
+/// `swung` \[rad\], and makes up for this part of what it heads aside besides.
 fn within(
     velocity: [f64; 2],
-    yaw: f64,
+    (yaw, swung): (f64, f64),
     (period, gain): (f64, f64),
     speed: f64,
     turn_rate: Option<f64>,
@@ -167,11 +181,13 @@ fn within(
         return Velocity { ahead: ahead * scale, left: left * scale, turn: 0.0 };
     };
     let error = if velocity == [0.0; 2] { 0.0 } else { left.atan2(ahead) };
-    let turn = (gain * error / period).clamp(-turn_rate, turn_rate);
+    let turn = ((swung + gain * (error - swung)) / period).clamp(-turn_rate, turn_rate);
     // It keeps clear of others on the straight way alone: it turns first, and drives in a turn only as far as leads it
-    // hardly aside: by half the turn, and all of what is left of it.
+    // hardly aside: by half the turn, and by what is left of it until that is made up for.
+    let left = (error - period * turn).abs();
+    let aside = (error - 0.5 * period * turn).abs() + left * (1.0 / gain - 1.0);
     let ahead = if error.abs() <= turn_rate * period {
-        ahead.clamp(0.0, speed).min(ASIDE / ((1.0 - 0.5 * gain) * period * error.abs()))
+        ahead.clamp(0.0, speed).min(ASIDE / (period * aside))
     } else {
         0.0
     };
@@ -191,12 +207,12 @@ mod tests {
 
     #[test]
     fn velocities_are_in_the_robot_s_own_axes_and_within_its_limits() {
-        let velocity = within([0.0, 5.0], FRAC_PI_2, (0.1, 1.0), 2.0, None);
+        let velocity = within([0.0, 5.0], (FRAC_PI_2, 0.0), (0.1, 1.0), 2.0, None);
         assert!(
             (velocity.ahead - 2.0).abs() < 1e-12 && velocity.left.abs() < 1e-12 && velocity.turn == 0.0,
             "{velocity:?}"
         );
-        let velocity = within([-0.5, 0.0], FRAC_PI_2, (0.1, 1.0), 2.0, None);
+        let velocity = within([-0.5, 0.0], (FRAC_PI_2, 0.0), (0.1, 1.0), 2.0, None);
         assert!((velocity.left - 0.5).abs() < 1e-12 && velocity.ahead.abs() < 1e-12, "{velocity:?}");
     }
 
@@ -351,19 +367,19 @@ mod tests {
     fn a_robot_that_cannot_go_sideways_turns_first() {
         // Of a quarter turn at once, and of what a period does not suffice for.
         for yaw in [0.0, 1.2] {
-            let velocity = within([0.0, 2.0], yaw, (0.1, 1.0), 2.0, Some(1.5));
+            let velocity = within([0.0, 2.0], (yaw, 0.0), (0.1, 1.0), 2.0, Some(1.5));
             assert_eq!((velocity.ahead, velocity.left, velocity.turn), (0.0, 0.0, 1.5));
         }
-        let ahead = within([2.0, 0.0], 0.0, (0.1, 1.0), 1.5, Some(1.5));
+        let ahead = within([2.0, 0.0], (0.0, 0.0), (0.1, 1.0), 1.5, Some(1.5));
         assert_eq!((ahead.ahead, ahead.turn), (1.5, 0.0));
-        let still = within([0.0; 2], 0.3, (0.1, 1.0), 2.0, Some(1.5));
+        let still = within([0.0; 2], (0.3, 0.0), (0.1, 1.0), 2.0, Some(1.5));
         assert_eq!(still, Velocity::default());
     }
 
     #[test]
     fn a_robot_that_turns_as_it_drives_stays_on_its_straight_way() {
         for (yaw, turn_rate) in [(0.1, 1.5), (0.3, 4.0), (-0.14, 1.5), (0.01, 1.5)] {
-            let velocity = within([1.0, 0.0], yaw, (0.1, 1.0), 2.0, Some(turn_rate));
+            let velocity = within([1.0, 0.0], (yaw, 0.0), (0.1, 1.0), 2.0, Some(turn_rate));
             let (mut y, mut heading, steps) = (0.0_f64, yaw, 1000);
             for _ in 0..steps {
                 y += velocity.ahead * heading.sin() * 0.1 / f64::from(steps);
@@ -371,6 +387,47 @@ mod tests {
             }
             assert!(y.abs() < 1.01 * ASIDE && heading.abs() < 1e-9, "{yaw}: {y} m aside");
             assert!(velocity.ahead > 0.05, "it goes on: {velocity:?}");
+        }
+    }
+
+    /// A unicycle on a circle, whose direction to its target turns all the time, seen late or not.
+    #[test]
+    fn a_robot_that_turns_follows_a_curve_behind_late_poses() {
+        const PERIOD: f64 = 0.05;
+        let text = format!(
+            "title = \"curve\"\nradius = 0.2\nlinks = {{ kind = \"nearest\", count = 1 }}\n\
+             robots = [{{ name = \"a\", place = [0.0, 0.0] }}, {{ name = \"b\", place = [30.0, 0.0] }}]\n\
+             leaders = [{{ robots = [\"a\", \"b\"], program = {{ kind = \"external\" }} }}]\n\
+             limits = {{ speed = 1.0, clearance = 0.3 }}\nposes = {{ fresh = 1.0, age_limit = 1.0 }}\n\
+             control = {{ period = {PERIOD} }}\nflight = {{ model = {{ kind = \"unicycle\", turn_rate = 90.0 }} }}\n"
+        );
+        let swarm =
+            Swarm::parse("curve", "curve.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+        for late in [0, 1, 4] {
+            let mut control = Control::new(&swarm).expect("laid out");
+            let mut steering = Steering::new(Some(FRAC_PI_2));
+            let mut robot = Steering::new(Some(FRAC_PI_2));
+            let mut poses = vec![([0.0; 2], FRAC_PI_2)];
+            let mut off = 0.0_f64;
+            for tick in 0..800_usize {
+                let now = tick as f64 * PERIOD;
+                // Half a metre a second around (-2, 0).
+                let (sin, cos) = (0.25 * now).sin_cos();
+                let place = [2.0 * cos - 2.0, 2.0 * sin];
+                assert!(control.place_leader(0, place) && control.place_leader(1, [30.0, 0.0]));
+                if let Some(old) = tick.checked_sub(late) {
+                    let (position, yaw) = poses[old];
+                    let pose = Pose { position, yaw, stamp: old as f64 * PERIOD, frame_is_right: true };
+                    control.receive(0, pose, now).expect("a pose");
+                    control.receive(1, Pose { position: [30.0, 0.0], ..pose }, now).expect("a pose");
+                }
+                control.tick(now);
+                robot.sent = VecDeque::from([(now, steering.next(&control, 0, control.target(0)))]);
+                let next = robot.carried(poses[tick], now, now + PERIOD);
+                off = if tick < 400 { off } else { off.max(distance(next.0, place)) };
+                poses.push(next);
+            }
+            assert!(off < 0.2, "{late} late: {off} m behind");
         }
     }
 }

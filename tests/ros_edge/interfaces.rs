@@ -147,14 +147,6 @@ fn velocities_lead_robots_with_late_poses_to_their_targets() {
         node.tick();
         std::thread::sleep(Duration::from_millis(15));
         let is_there = places.iter().zip(&goals).all(|(place, goal)| distance(*place, *goal) < 0.02);
-        println!(
-            "{:.3} {places:.4?} {:?} target {:?} age {:?} twist {:?}",
-            now - been[0].0,
-            node.control().health(0),
-            node.control().target(0),
-            node.control().age(0),
-            (robots[0].2.linear.x, robots[0].2.linear.y)
-        );
         at_rest = if is_there { at_rest + 1 } else { 0 };
         (at_rest > 30).then_some(())
     });

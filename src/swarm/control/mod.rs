@@ -592,8 +592,9 @@ impl Control {
         if awaited.peek().is_none() {
             return true;
         }
-        // A leader that is lost on the way holds up no program, nor does it where an earlier loop had begun.
-        if !self.goes_on && awaited.any(|m| self.formation.leads(m)) {
+        // A leader that is lost on the way holds up no program, nor does it where an earlier loop had begun and another is heard.
+        let is_led = (0..self.known.len()).any(|m| self.known[m] && self.formation.leads(m));
+        if !(self.goes_on && is_led) && awaited.any(|m| self.formation.leads(m)) {
             self.led_since = None;
             return false;
         }
