@@ -58,8 +58,6 @@ pub struct Life {
     /// The part of the last state that has not been sent yet.
     unsent: Vec<u8>,
     sent: Option<Instant>,
-    /// Whether the next state is not to wait until it is due.
-    is_urgent: bool,
 }
 
 /// Runs this program again as a child, and another whenever one ends for no reason of its own; returns in the child,
@@ -216,15 +214,7 @@ impl Life {
             tracing::warn!("what the processes before this one left cannot be read ({error}): starting anew");
             (None, Value::Null)
         });
-        Ok(Self {
-            number,
-            socket: Some(socket),
-            text,
-            left,
-            unsent: Vec::new(),
-            sent: None,
-            is_urgent: false,
-        })
+        Ok(Self { number, socket: Some(socket), text, left, unsent: Vec::new(), sent: None })
     }
 
     /// From 1.
@@ -244,16 +234,18 @@ impl Life {
 
     /// Sends the state if it is due, or has changed by a command. Returns false if the socket is closed: the process should end.
     pub fn send<T: Serialize>(&mut self, has_changed: bool, state: impl FnOnce() -> T) -> bool {
-        self.is_urgent |= has_changed;
-        if !self.is_urgent && self.sent.is_some_and(|sent| sent.elapsed() < SEND_PERIOD) {
+        if has_changed {
+            self.sent = None;
+        }
+        if self.sent.is_some_and(|sent| sent.elapsed() < SEND_PERIOD) {
             return true;
         }
         let Some(socket) = &mut self.socket else { return true };
-        self.sent = Some(Instant::now());
+        // What is left of the state before goes first.
         if self.unsent.is_empty()
             && let Ok(line) = serde_json::to_vec(&state())
         {
-            (self.unsent, self.is_urgent) = (line, false);
+            (self.unsent, self.sent) = (line, Some(Instant::now()));
             self.unsent.push(b'\n');
         }
         let goes_on =

@@ -9,8 +9,9 @@
 use std::collections::VecDeque;
 
 use super::control::{Control, Mode};
+use super::robots::wrapped;
 use super::safety::Limits;
-use super::watch::Pose;
+use super::watch::{MOST_SENT, Pose};
 use crate::flock::vectors::distance;
 use crate::geometry::point::{dot, minus};
 
@@ -40,9 +41,6 @@ pub struct Steering {
     bearing: Option<f64>,
 }
 
-/// Velocities that are kept: older ones are of a robot that has long been lost.
-const MOST_SENT: usize = 1024;
-
 impl Steering {
     /// Of a robot that turns no faster than `turn_rate` \[rad/s\] and cannot go sideways; `None` of one that can.
     pub fn new(turn_rate: Option<f64>) -> Self {
@@ -58,10 +56,7 @@ impl Steering {
                 self.forget(pose.stamp, now);
             }
             // Where it is when it is heard again its pose alone will say.
-            None => (self.last, self.target, self.bearing) = (None, None, None),
-        }
-        if self.last.is_none() {
-            self.sent.clear();
+            None => *self = Self::new(self.turn_rate),
         }
         let velocity = target.and_then(|target| self.towards(control, member, target)).unwrap_or_default();
         if self.sent.len() == MOST_SENT {
@@ -79,10 +74,13 @@ impl Steering {
         const SLIP: f64 = 0.1;
         /// Deviations beyond which a pose is no noise \[1\].
         const MOST: f64 = 4.0;
-        let Some(last) = self.last.filter(|last| last.stamp < pose.stamp) else {
-            let is_old = self.last.is_some_and(|last| last.stamp == pose.stamp);
-            self.last = if is_old { self.last } else { Some(pose) };
-            return;
+        let last = match self.last {
+            Some(last) if last.stamp == pose.stamp => return,
+            Some(last) if last.stamp < pose.stamp => last,
+            _ => {
+                self.last = Some(pose);
+                return;
+            }
         };
         let (expected, _) = self.carried((last.position, last.yaw), last.stamp, pose.stamp);
         let off = minus(pose.position, expected);
@@ -129,10 +127,7 @@ impl Steering {
             way.map(|x| share * x / period)
         });
         self.bearing = (velocity != [0.0; 2]).then(|| velocity[1].atan2(velocity[0]));
-        let swung = self
-            .bearing
-            .zip(bearing)
-            .map_or(0.0, |(now, before)| (now - before).sin().atan2((now - before).cos()));
+        let swung = self.bearing.zip(bearing).map_or(0.0, |(now, before)| wrapped(now - before));
         Some(within(velocity, (yaw, swung), (period, gain), limits.speed, self.turn_rate))
     }
 
@@ -205,6 +200,22 @@ mod tests {
     use super::*;
     use crate::scene::swarm::Swarm;
 
+    /// Where the second of two robots starts, out of the way of the first.
+    const FAR: [f64; 2] = [0.0, 9.0];
+    /// Poses that may be late.
+    const LATE: &str = "poses = { fresh = 1.0, age_limit = 1.0 }\n";
+
+    /// Two robots that both lead.
+    fn two(program: &str, more: &str) -> Swarm {
+        let text = format!(
+            "title = \"drive\"\nradius = 0.2\nlinks = {{ kind = \"nearest\", count = 1 }}\n\
+             robots = [{{ name = \"a\", place = [0.0, 0.0] }}, {{ name = \"b\", place = {FAR:?} }}]\n\
+             leaders = [{{ robots = [\"a\", \"b\"], program = {{ {program} }} }}]\n\
+             limits = {{ speed = 1.5, clearance = 0.3 }}\n{more}"
+        );
+        Swarm::parse("drive", "drive.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"))
+    }
+
     #[test]
     fn velocities_are_in_the_robot_s_own_axes_and_within_its_limits() {
         let velocity = within([0.0, 5.0], (FRAC_PI_2, 0.0), (0.1, 1.0), 2.0, None);
@@ -264,15 +275,12 @@ mod tests {
     fn robots_that_are_seen_late_pass_through_their_targets_and_arrive() {
         const PERIOD: f64 = 0.1;
         for (model, goal) in [("integrator\"", [3.0, 0.0]), ("unicycle\", turn_rate = 90.0", [-0.5, 2.0])] {
-            let text = format!(
-                "title = \"drive\"\nradius = 0.2\nlinks = {{ kind = \"nearest\", count = 1 }}\n\
-                 robots = [{{ name = \"a\", place = [0.0, 0.0] }}, {{ name = \"b\", place = [0.0, 9.0] }}]\n\
-                 leaders = [{{ robots = [\"a\", \"b\"], program = {{ kind = \"path\", points = [{{ at = 8.0, displacement = {goal:?} }}] }} }}]\n\
-                 limits = {{ speed = 1.5, clearance = 0.3 }}\nposes = {{ fresh = 1.0, age_limit = 1.0 }}\n\
-                 control = {{ period = {PERIOD} }}\nflight = {{ model = {{ kind = \"{model} }} }}\n"
+            let swarm = two(
+                &format!("kind = \"path\", points = [{{ at = 8.0, displacement = {goal:?} }}]"),
+                &format!(
+                    "{LATE}control = {{ period = {PERIOD} }}\nflight = {{ model = {{ kind = \"{model} }} }}\n"
+                ),
             );
-            let swarm = Swarm::parse("drive", "drive.toml", &text, &[], None)
-                .unwrap_or_else(|error| panic!("{error}"));
             // Some slip, and go a twentieth less than they are driven, or are driven some periods later.
             for (late, slip, lag) in [
                 (0, 0.0, 0),
@@ -286,8 +294,8 @@ mod tests {
             ] {
                 let mut control = Control::new(&swarm).expect("laid out");
                 let turn_rate = model.starts_with("unicycle").then_some(FRAC_PI_2);
-                let mut steering = Steering { turn_rate, ..Steering::default() };
-                let mut robot = Steering { turn_rate, ..Steering::default() };
+                let mut steering = Steering::new(turn_rate);
+                let mut robot = Steering::new(turn_rate);
                 let mut poses = vec![([0.0; 2], 0.0)];
                 let mut ahead = VecDeque::from(vec![Velocity::default(); lag]);
                 let (mut off, mut turned) = (0.0_f64, 0.0_f64);
@@ -297,7 +305,7 @@ mod tests {
                         let (position, yaw) = poses[old];
                         let pose = Pose { position, yaw, stamp: old as f64 * PERIOD, frame_is_right: true };
                         control.receive(0, pose, now).expect("a pose");
-                        control.receive(1, Pose { position: [0.0, 9.0], ..pose }, now).expect("a pose");
+                        control.receive(1, Pose { position: FAR, ..pose }, now).expect("a pose");
                     }
                     control.tick(now);
                     let target = control.target(0);
@@ -328,21 +336,19 @@ mod tests {
     fn a_robot_that_stands_follows_little_of_the_noise_of_its_poses() {
         const PERIOD: f64 = 0.1;
         const NOISE: f64 = 0.03;
-        let text = format!(
-            "title = \"noise\"\nradius = 0.2\nlinks = {{ kind = \"nearest\", count = 1 }}\n\
-             robots = [{{ name = \"a\", place = [0.0, 0.0] }}, {{ name = \"b\", place = [0.0, 9.0] }}]\n\
-             leaders = [{{ robots = [\"a\", \"b\"], program = {{ kind = \"external\" }} }}]\nlimits = {{ speed = 1.5, clearance = 0.3 }}\n\
-             control = {{ period = {PERIOD} }}\nflight = {{ noise = {NOISE}, model = {{ kind = \"integrator\" }} }}\n"
+        let swarm = two(
+            "kind = \"external\"",
+            &format!(
+                "control = {{ period = {PERIOD} }}\nflight = {{ noise = {NOISE}, model = {{ kind = \"integrator\" }} }}\n"
+            ),
         );
-        let swarm =
-            Swarm::parse("noise", "noise.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"));
         let mut control = Control::new(&swarm).expect("laid out");
         let mut steering = Steering::default();
         let mut random = Pcg64Mcg::seed_from_u64(3);
         let (mut place, mut squares, ticks) = ([0.0_f64; 2], [0.0_f64; 2], 2_000);
         for tick in 0..ticks {
             let now = f64::from(tick) * PERIOD;
-            for (member, here) in [(0, place), (1, [0.0, 9.0])] {
+            for (member, here) in [(0, place), (1, FAR)] {
                 let position = here.map(|x| x + NOISE * random.sample::<f64, _>(StandardNormal));
                 let pose = Pose { position, yaw: 0.0, stamp: now, frame_is_right: true };
                 control.receive(member, pose, now).expect("a pose");
@@ -394,15 +400,11 @@ mod tests {
     #[test]
     fn a_robot_that_turns_follows_a_curve_behind_late_poses() {
         const PERIOD: f64 = 0.05;
-        let text = format!(
-            "title = \"curve\"\nradius = 0.2\nlinks = {{ kind = \"nearest\", count = 1 }}\n\
-             robots = [{{ name = \"a\", place = [0.0, 0.0] }}, {{ name = \"b\", place = [30.0, 0.0] }}]\n\
-             leaders = [{{ robots = [\"a\", \"b\"], program = {{ kind = \"external\" }} }}]\n\
-             limits = {{ speed = 1.0, clearance = 0.3 }}\nposes = {{ fresh = 1.0, age_limit = 1.0 }}\n\
-             control = {{ period = {PERIOD} }}\nflight = {{ model = {{ kind = \"unicycle\", turn_rate = 90.0 }} }}\n"
+        let model = "model = { kind = \"unicycle\", turn_rate = 90.0 }";
+        let swarm = two(
+            "kind = \"external\"",
+            &format!("{LATE}control = {{ period = {PERIOD} }}\nflight = {{ {model} }}\n"),
         );
-        let swarm =
-            Swarm::parse("curve", "curve.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"));
         for late in [0, 1, 4] {
             let mut control = Control::new(&swarm).expect("laid out");
             let mut steering = Steering::new(Some(FRAC_PI_2));
@@ -414,12 +416,12 @@ mod tests {
                 // Half a metre a second around (-2, 0).
                 let (sin, cos) = (0.25 * now).sin_cos();
                 let place = [2.0 * cos - 2.0, 2.0 * sin];
-                assert!(control.place_leader(0, place) && control.place_leader(1, [30.0, 0.0]));
+                assert!(control.place_leader(0, place) && control.place_leader(1, FAR));
                 if let Some(old) = tick.checked_sub(late) {
                     let (position, yaw) = poses[old];
                     let pose = Pose { position, yaw, stamp: old as f64 * PERIOD, frame_is_right: true };
                     control.receive(0, pose, now).expect("a pose");
-                    control.receive(1, Pose { position: [30.0, 0.0], ..pose }, now).expect("a pose");
+                    control.receive(1, Pose { position: FAR, ..pose }, now).expect("a pose");
                 }
                 control.tick(now);
                 robot.sent = VecDeque::from([(now, steering.next(&control, 0, control.target(0)))]);

@@ -29,12 +29,12 @@ const TRIES: u32 = 10;
 fn off(scene: &str, sets: &[&str]) -> Vec<String> {
     let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
     let folder = temporary();
-    let on_threads = |arguments: &[&str]| {
+    let on_one_thread = |arguments: &[&str]| {
         let mut command = command(arguments, folder.path());
         command.env("RAYON_NUM_THREADS", "1");
         command
     };
-    let plan = on_threads(&[&["plan", scene, "--json"], &sets[..]].concat()).output();
+    let plan = on_one_thread(&[&["plan", scene, "--json"], &sets[..]].concat()).output();
     let plan = plan.expect("the program starts");
     let plan: serde_json::Value = serde_json::from_slice(&plan.stdout).expect("JSON");
     let mut off = Vec::new();
@@ -45,7 +45,7 @@ fn off(scene: &str, sets: &[&str]) -> Vec<String> {
         // On a busy computer the last of a short process is not seen: what is seen is never more than it takes.
         for _ in 0..TRIES {
             if found < 0.95 * predicted {
-                let child = on_threads(&run).stdout(Stdio::null()).spawn().expect("starts");
+                let child = on_one_thread(&run).stdout(Stdio::null()).spawn().expect("starts");
                 found = found.max(peak(child));
             }
         }

@@ -48,6 +48,15 @@ fn loops(swarm: &Swarm, alone: bool) -> Vec<Control> {
     if alone { (0..ROBOTS).map(own).collect() } else { vec![control()] }
 }
 
+/// Poses of this time: the first robot's, and of the others their places.
+fn hear(control: &mut Control, first: [f64; 2], stamp: f64, now: f64) {
+    let places = control.formation().places.clone();
+    for (k, place) in places.iter().enumerate() {
+        let position = if k == 0 { first } else { place };
+        control.receive(k, Pose { position, yaw: 0.0, stamp, frame_is_right: true }, now).expect("a pose");
+    }
+}
+
 /// Whatever the pace at which robots go straight to their targets, some of them not at all for a while, and whether a command
 /// is there at once or a period later.
 #[test]
@@ -282,13 +291,7 @@ fn robots_come_to_rest_in_an_emergency_stop_and_do_not_go_back() {
         for tick in 0..200 {
             let now = tick as f64 * PERIOD;
             if let Some(old) = (tick as usize).checked_sub(late) {
-                let stamp = old as f64 * PERIOD;
-                let pose = Pose { position: poses[old], yaw: 0.0, stamp, frame_is_right: true };
-                control.receive(0, pose, now).expect("a pose");
-                for k in 1..ROBOTS {
-                    let position = control.formation().places.get(k);
-                    control.receive(k, Pose { position, ..pose }, now).expect("a pose");
-                }
+                hear(&mut control, poses[old], old as f64 * PERIOD, now);
             }
             if tick == 80 {
                 stopped_at = robot.position[0];
@@ -351,13 +354,7 @@ fn a_lower_speed_limit_sends_no_robot_back() {
         for tick in 0..100_usize {
             let now = tick as f64 * PERIOD;
             if let Some(old) = tick.checked_sub(late) {
-                let stamp = old as f64 * PERIOD;
-                let pose = Pose { position: poses[old], yaw: 0.0, stamp, frame_is_right: true };
-                control.receive(0, pose, now).expect("a pose");
-                for k in 1..ROBOTS {
-                    let position = control.formation().places.get(k);
-                    control.receive(k, Pose { position, ..pose }, now).expect("a pose");
-                }
+                hear(&mut control, poses[old], old as f64 * PERIOD, now);
             }
             if tick == 50 {
                 let limits = Limits { speed: 0.2, ..control.limits().clone() };

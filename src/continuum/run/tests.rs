@@ -266,3 +266,30 @@ fn a_rule_is_not_blamed_for_a_leader_that_leaves_the_body_behind() {
         );
     }
 }
+
+/// A run that a leader has torn apart says it of any rule; here each rule is asked for itself.
+#[test]
+fn a_sweep_is_said_to_grow_by_those_terms_alone_that_make_one_grow() {
+    for (rule, word) in [
+        ("rule.feedback={factor=-0.05}", None),
+        ("rule.feedback={factor=0.5}", Some("spectral radius")),
+        ("rule.feedback={factor=-0.1,reference=\"previous\"}", None),
+        ("rule.feedback={factor=0.5,reference=\"previous\"}", Some("between -1 and 0")),
+        ("rule.feedback={factor=-1.5,reference=\"previous\"}", Some("between -1 and 0")),
+        ("rule.mean={kind=\"distance\",power=-1.0}", None),
+        ("rule.mean={kind=\"distance\",power=1.0}", Some("grow with distance")),
+        ("rule.poisson={k=0.0}", None),
+        ("rule.poisson={k=-0.3}", Some("smaller K")),
+        ("rule.weights={kind=\"list\",values=[1,2,1,2]}", None),
+        ("rule.weights={kind=\"list\",values=[1,-0.5,1,1]}", Some("both signs")),
+    ] {
+        let outcome =
+            run(plan(&scene("tension", &["stop.steps=1", rule])), &mut |_, _| ControlFlow::Continue(()));
+        let cause = cause_in_sweep(&outcome.engine);
+        let is_as_expected = match (&cause, word) {
+            (Some(cause), Some(word)) => cause.contains(word),
+            (cause, word) => cause.is_some() == word.is_some(),
+        };
+        assert!(is_as_expected, "{rule}: {cause:?}");
+    }
+}

@@ -10,7 +10,7 @@ use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::marker::PhantomData;
 use std::sync::Arc;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 use ros2_client::RmwRequestId;
 use ros2_client::dds::rustdds::rpc::SampleIdentity;
@@ -25,6 +25,7 @@ use super::whole::LARGEST;
 use super::{EdgeError, Quality};
 use crate::messages::wire::{BadPayload, Order, decode, encode};
 use crate::messages::{ServiceType, said};
+use crate::swarm::pace::system_time;
 
 /// Bytes before a request or reply of Cyclone DDS.
 const HEADER: usize = 16;
@@ -81,8 +82,7 @@ impl<S: ServiceType> Service<S> {
     /// which would do again what was done long ago.
     #[must_use]
     pub fn from_now_on(self) -> Self {
-        let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |time| time.as_secs_f64());
-        Self { from: Some(now), ..self }
+        Self { from: Some(system_time()), ..self }
     }
 
     /// The next request and its client, or none. Payloads that are no request are skipped and counted.

@@ -392,7 +392,6 @@ impl FormationNode {
     }
 
     fn answer(&mut self, now: f64) {
-        let was_active = self.was_active;
         let allowed = self.origin.swarm.raw.node.commands;
         let may_switch = |edge: &Transition| {
             allowed.may_do_all() || (allowed.may_stop() && ["deactivate", "shutdown"].contains(&edge.label))
@@ -416,6 +415,7 @@ impl FormationNode {
         self.record_beginning(now);
         if self.lifecycle.is_active() != self.was_active {
             self.was_active = self.lifecycle.is_active();
+            self.is_changed.set(true);
             let kind = if self.was_active { LoopEvent::ACTIVE } else { LoopEvent::INACTIVE };
             self.record_event(now, kind, "", &[]);
         }
@@ -461,9 +461,9 @@ impl FormationNode {
             let answer = answer.unwrap_or_else(|| commanded.perform(&command));
             self.queue.iter().for_each(|queue| drop(queue.answers.try_send((number, answer.clone()))));
         }
-        let is_active = self.lifecycle.is_active();
-        let is_changed = is_active != was_active || !changes.is_empty() || !commanded.events.is_empty();
-        self.is_changed.set(self.is_changed.get() || is_changed);
+        if !changes.is_empty() || !commanded.events.is_empty() {
+            self.is_changed.set(true);
+        }
         for (kind, text, values) in commanded.events {
             self.record_event(now, kind, &text, &values);
         }

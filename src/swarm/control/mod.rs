@@ -109,7 +109,7 @@ pub struct Control {
     run_before: f64,
     /// Periods run since the beginning.
     periods: u64,
-    /// Whether every leader that the loop listens to has sent a pose, and the others have been waited for.
+    /// Whether the programs have begun: see [`Control::may_begin`].
     begun: bool,
     /// Whether they had begun in an earlier loop of which this is the continuation.
     goes_on: bool,
@@ -406,7 +406,7 @@ impl Control {
         }
     }
 
-    /// Whether every leader that the loop listens to has been heard, so that the leaders' programs run.
+    /// Whether those that are waited for have been heard, so that the leaders' programs run.
     pub fn has_begun(&self) -> bool {
         self.begun
     }

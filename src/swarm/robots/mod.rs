@@ -11,6 +11,7 @@ mod unicycle;
 pub use double_integrator::DoubleIntegrator;
 pub use integrator::Integrator;
 pub use unicycle::Unicycle;
+pub(super) use unicycle::wrapped;
 
 use serde::{Deserialize, Serialize};
 

@@ -53,7 +53,7 @@ impl Unicycle {
 }
 
 /// The same angle in (-pi, pi\].
-fn wrapped(angle: f64) -> f64 {
+pub(in crate::swarm) fn wrapped(angle: f64) -> f64 {
     let turned = angle.rem_euclid(TAU);
     if turned > PI { turned - TAU } else { turned }
 }

@@ -258,14 +258,12 @@ impl Filter {
         let is_elsewhere = goes_on || has_arrived;
         if !is_elsewhere || !last.iter().all(|x| x.is_finite()) {
             // Nothing says that it has gone on by a limit that was higher.
-            return match self.fastest() > self.limits.speed {
-                true => {
-                    let most = self.limits.speed * (period + self.ahead(seen, member));
-                    let step = shortened(minus(target, here), most);
-                    [here[0] + step[0], here[1] + step[1]]
-                }
-                false => target,
-            };
+            if self.fastest() > self.limits.speed {
+                let most = self.limits.speed * (period + self.ahead(seen, member));
+                let step = shortened(minus(target, here), most);
+                return [here[0] + step[0], here[1] + step[1]];
+            }
+            return target;
         }
         let way = [target[0] - last[0], target[1] - last[1]];
         let step = shortened(way, self.limits.speed * period);

@@ -15,6 +15,7 @@ pub use limits::WatchLimits;
 use ranges::Measured;
 pub use ranges::{Range, RangeLimits};
 pub use rejection::{Counts, Rejection};
+pub(super) use track::MOST_SENT;
 pub use track::{Gains, Track};
 
 /// A pose as it comes in.

@@ -62,8 +62,8 @@ pub struct Track {
     sent: VecDeque<(f64, Option<[f64; 2]>)>,
 }
 
-/// Targets that are kept: older ones are of a robot that has long been lost.
-const MOST_SENT: usize = 1024;
+/// Targets, or velocities, that are kept: older ones are of a robot that has long been lost.
+pub(in crate::swarm) const MOST_SENT: usize = 1024;
 
 /// Distance of a pose from the model up to which they agree, in units of the way that the acceleration makes \[1\], and
 /// of the deviation of poses \[1\].
