@@ -3,34 +3,20 @@
 //   node tour.mjs REPORT.html '{"find": [["67", 20]], "hover": [0, 5], "painter": "webgl"}'
 //
 // `find` names particles and values of the clock at which their numbers are asked for by keyboard; `hover` numbers
-// particles (from 0) that are pointed at in the last frame. FLOCKFORM_NODE_MODULES is a folder with playwright-core and
-// axe-core.
+// particles (from 0) that are pointed at in the last frame.
 
-import { createRequire } from "node:module";
 import { readFileSync } from "node:fs";
-import { mkdtempSync, rmSync } from "node:fs";
-import { tmpdir } from "node:os";
-import { join, resolve } from "node:path";
+import { resolve } from "node:path";
 import { pathToFileURL } from "node:url";
 
-const modules = join(resolve(process.env.FLOCKFORM_NODE_MODULES ?? "node_modules"), "/");
-const { chromium } = createRequire(modules)("playwright-core");
-const axe = readFileSync(join(modules, "axe-core/axe.min.js"), "utf8");
+import { judge, tour, watched } from "../common/browser.mjs";
+
 const [file, asked] = [process.argv[2], JSON.parse(process.argv[3] ?? "{}")];
 
-const FLAGS = [
-  "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
-  "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
-];
-
-const seen = { errors: [], requests: [], frames: {}, numbers: [], pictures: {}, faults: [] };
+const seen = { frames: {}, numbers: [], pictures: {} };
 
 async function open(context) {
-  const page = await context.newPage();
-  page.setDefaultTimeout(30_000);
-  page.on("console", (message) => message.type() === "error" && seen.errors.push(message.text()));
-  page.on("pageerror", (error) => seen.errors.push(error.message));
-  page.on("request", (request) => seen.requests.push(request.url().slice(0, 60)));
+  const page = await watched(context, seen, 30_000);
   const query = asked.painter ? `?painter=${asked.painter}` : "";
   await page.goto(pathToFileURL(resolve(file)).href + query);
   await page.waitForSelector("body[data-ready=true]");
@@ -318,9 +304,7 @@ async function saved(page) {
   await settled(page);
   for (const [button, kind] of [["picture", "png"], ["drawing", "svg"]]) {
     const [download] = await Promise.all([page.waitForEvent("download"), page.click(`#${button}`)]);
-    const path = join(profile, `saved.${kind}`);
-    await download.saveAs(path);
-    const bytes = readFileSync(path);
+    const bytes = readFileSync(await download.path());
     const name = download.suggestedFilename();
     seen.saved[kind] = { name, size: bytes.length };
     if (kind === "png") seen.saved.png.pixels = [bytes.readUInt32BE(16), bytes.readUInt32BE(20)];
@@ -370,18 +354,7 @@ async function points(page) {
   }
 }
 
-async function judge(page, theme) {
-  await page.addScriptTag({ content: axe });
-  const result = await page.evaluate(() => window.axe.run(document, { resultTypes: ["violations"] }));
-  const serious = result.violations.filter((one) => one.impact === "serious" || one.impact === "critical");
-  seen.faults.push(...serious.map((one) => `${theme}: ${one.id}: ${one.nodes.map((node) => node.target).join(" ")}`));
-}
-
-const profile = mkdtempSync(join(tmpdir(), "flockform-browser-"));
-const executablePath = process.env.FLOCKFORM_CHROMIUM ?? "/usr/bin/chromium";
-const options = { executablePath, args: FLAGS, headless: true, viewport: { width: 1280, height: 1000 } };
-const context = await chromium.launchPersistentContext(profile, options);
-try {
+await tour("browser", seen, async (context) => {
   const page = await open(context);
   seen.views = await page.evaluate(() => window.report.views.length);
   seen.charts = await page.evaluate(() => document.querySelectorAll("#plots figure").length);
@@ -405,13 +378,5 @@ try {
   seen.command = await page.textContent("#command");
   await points(page);
   seen.title = await page.title();
-  for (const theme of ["light", "dark"]) {
-    await page.evaluate((name) => (document.documentElement.dataset.theme = name), theme);
-    await settled(page);
-    await judge(page, theme);
-  }
-  console.log(JSON.stringify(seen));
-} finally {
-  await context.close();
-  rmSync(profile, { recursive: true, force: true });
-}
+  await judge(page, seen);
+});

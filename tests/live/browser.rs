@@ -28,6 +28,7 @@ fn tour(address: &str, asked: &Value) -> Value {
     let seen = node("tour.mjs", &[address, &asked.to_string()]);
     println!("{}", seen["words"]);
     assert_eq!(seen["errors"], json!([]), "the console has no errors");
+    assert_eq!(seen["faults"], json!([]), "axe finds nothing serious");
     let (origin, _) = address.split_once('?').expect("with a token");
     let is_own = |url: &Value| {
         let url = url.as_str().unwrap_or_default();

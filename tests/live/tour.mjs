@@ -5,34 +5,21 @@
 // `drag` numbers the particle that is dragged, `cut` has the ends of a cut, `key` is a key to change, `fault` the robot that is
 // killed, `push` says where an obstacle is taken and how far it goes, `squeeze` that the slider is moved, `load` has the particle
 // whose edge is loaded, `design` says what a designer does, `node` the leader of a node that is dragged, `first` the particle and
-// `follower` the robot that are dragged in a session that stands still as it began. FLOCKFORM_NODE_MODULES is a folder with playwright-core and axe-core, FLOCKFORM_PICTURES one for screenshots.
+// `follower` the robot that are dragged in a session that stands still as it began. FLOCKFORM_PICTURES is a folder for screenshots.
 
-import { createRequire } from "node:module";
-import { mkdtempSync, readFileSync, rmSync } from "node:fs";
-import { tmpdir } from "node:os";
-import { join, resolve } from "node:path";
+import { join } from "node:path";
 
-const modules = join(resolve(process.env.FLOCKFORM_NODE_MODULES ?? "node_modules"), "/");
-const { chromium } = createRequire(modules)("playwright-core");
-const axe = readFileSync(join(modules, "axe-core/axe.min.js"), "utf8");
+import { judge, tour, watched } from "../common/browser.mjs";
+
 const [address, asked] = [process.argv[2], JSON.parse(process.argv[3] ?? "{}")];
 const pictures = process.env.FLOCKFORM_PICTURES;
 
-const FLAGS = [
-  "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
-  "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
-];
-
-const seen = { errors: [], requests: [], faults: [] };
+const seen = {};
 
 const mark = (what) => process.env.FLOCKFORM_MARKS && console.error(Math.round(performance.now()), what);
 
 async function open(context) {
-  const page = await context.newPage();
-  page.setDefaultTimeout(60_000);
-  page.on("console", (message) => message.type() === "error" && seen.errors.push(message.text()));
-  page.on("pageerror", (error) => seen.errors.push(error.message));
-  page.on("request", (request) => seen.requests.push(request.url()));
+  const page = await watched(context, seen, 60_000);
   await page.goto(address);
   await page.waitForSelector("body[data-live=open]");
   await page.waitForFunction(() => window.report.live.session.frame);
@@ -478,11 +465,7 @@ async function everything(page, other) {
   await save(page);
 }
 
-const profile = mkdtempSync(join(tmpdir(), "flockform-live-"));
-const executablePath = process.env.FLOCKFORM_CHROMIUM ?? "/usr/bin/chromium";
-const options = { executablePath, args: FLAGS, headless: true, viewport: { width: 1280, height: 1000 } };
-const context = await chromium.launchPersistentContext(profile, options);
-try {
+await tour("live", seen, async (context) => {
   const other = await open(context);
   const page = await open(context);
   await page.bringToFront();
@@ -491,10 +474,6 @@ try {
   else if (asked.first !== undefined) await first(page);
   else if (asked.follower !== undefined) await follower(page);
   else await everything(page, other);
-  await page.addScriptTag({ content: axe }).catch(() => {});
   seen.words = await page.textContent("#loading");
-  console.log(JSON.stringify(seen));
-} finally {
-  await context.close();
-  rmSync(profile, { recursive: true, force: true });
-}
+  await judge(page, seen);
+});

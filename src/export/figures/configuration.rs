@@ -91,6 +91,13 @@ impl Setting {
         }
     }
 
+    /// Whether a surface is seen: one that is thinner is drawn as dots.
+    fn is_wide(&self, axes: &Axes) -> bool {
+        /// \[px\]
+        const LEAST: f64 = 2.0;
+        self.bounds.is_none_or(|[low, high]| (0..2).all(|k| (high[k] - low[k]) * axes.scale() >= LEAST))
+    }
+
     /// Makes room for this configuration, and for these values of its particles, shape \[count\].
     pub fn include(&mut self, subject: &Subject<'_>, snapshot: &Snapshot, values: Option<&[f64]>) {
         let owned = subject.body.owned();
@@ -178,7 +185,7 @@ pub fn configuration_in(
                 let values = drawn.map(|i| (axes.place(snapshot.positions.get(i)), field.values[i]));
                 field.bands.draw_raster(svg, (axes, spacing), values, subject.team);
             }
-            (Style::Surface, Some(field)) => {
+            (Style::Surface, Some(field)) if setting.is_wide(axes) => {
                 let is_shown = |i: usize| snapshot.roles[i].is_body() && field.values[i].is_finite();
                 let is_drawn: Vec<bool> = (0..field.values.len()).map(is_shown).collect();
                 draw_contours(svg, axes, subject, (snapshot, field.values), &is_drawn, field.bands);

@@ -105,8 +105,10 @@ impl Svg {
         self.push(format_args!(
             "<text x=\"{x:.2}\" y=\"{y:.2}\" dy=\"{rise:.2}\" text-anchor=\"{anchor}\" font-size=\"{size}\" \
              fill=\"{colour}\"{turn}>{}</text>",
-            // XML 1.0 has no place for control characters, not even as references.
-            escaped(&content.replace(char::is_control, " "))
+            // XML 1.0 has no place for control characters and these two, not even as references.
+            escaped(
+                &content.replace(|c: char| c.is_control() || ('\u{fffe}'..='\u{ffff}').contains(&c), " ")
+            )
         ));
     }
 

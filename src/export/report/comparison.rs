@@ -101,7 +101,7 @@ fn stage(
         let part = frame as f64 / FRAMES as f64;
         let scaled =
             [&moved.x[..], &moved.y, stress, error].map(|v| v.iter().map(|v| part * v).collect::<Vec<f64>>());
-        frames.keep(frame, &scaled.each_ref().map(Vec::as_slice));
+        frames.keep(frame, |k, _| (&scaled[k]).into());
     }
     let encoded = encoded(&mut frames, stage.size());
     let times = frames.kept().iter().map(|frame| 100.0 * frame.step as f64 / FRAMES as f64).collect();

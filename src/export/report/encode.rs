@@ -238,10 +238,10 @@ mod tests {
         let mut frames = Frames::new(10_000, vec![Channel { name: "dx", bits: 16 }; 2]);
         let noise: Vec<f64> =
             (0..10_000_u32).map(|i| f64::from(i.wrapping_mul(2_654_435_761) >> 8)).collect();
-        (0..GROUP).for_each(|step| frames.keep(step, &[&noise, &noise]));
+        (0..GROUP).for_each(|step| frames.keep(step, |_, _| (&noise).into()));
         let one = EncodedFrames::of(&{
             let mut one = Frames::new(10_000, frames.channels.clone());
-            one.keep(0, &[&noise, &noise]);
+            one.keep(0, |_, _| (&noise).into());
             one
         });
         let all = EncodedFrames::of(&frames);

@@ -123,8 +123,8 @@ impl FlightRecorder {
             measures.strain.iter().map(|strain| strain.map_or(f64::NAN, |s| s.largest())).collect();
         // In the order of the channels.
         let values = [&dx[..], &dy, &clearance, &away, speed, acceleration, &age, &measures.pe1, &strain];
-        let period = period as usize;
-        if is_last { self.frames.keep_last(period, &values) } else { self.frames.keep(period, &values) }
+        let (period, values) = (period as usize, |k: usize, _: &Channel| values[k].into());
+        if is_last { self.frames.keep_last(period, values) } else { self.frames.keep(period, values) }
     }
 
     pub(in crate::export) fn frames(&self) -> &[Frame] {
@@ -167,7 +167,7 @@ impl FlightRecorder {
         stage.add_exact(Quantity::new("y", "y", "m"), robots().map(|robot| robot.y));
         stage.add_exact(Quantity::new("way", "way", "m"), robots().map(|robot| robot.way));
         let least = robots().map(|robot| robot.clearance.unwrap_or(f64::NAN));
-        stage.add_exact(Quantity::new("clearance", "least clearance", "m"), least);
+        stage.add_exact(Quantity::new("least_clearance", "least clearance", "m"), least);
         self.finished(stage)
     }
 

@@ -3,6 +3,8 @@
 //! Frames are kept at an interval that doubles whenever there are too many: every other one is then let go,
 //! so memory is bounded and the kept ones are evenly spaced.
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 
 use super::quantized_channel::QuantizedChannel;
@@ -82,8 +84,8 @@ impl Frames {
         (step / self.interval + 1) * self.interval
     }
 
-    /// Keeps the values of every channel, shape \[channels\]\[count\], of a step later than those before.
-    pub fn keep(&mut self, step: usize, values: &[&[f64]]) {
+    /// Keeps the values of every channel, by its number, shape \[count\], of a step later than those before.
+    pub fn keep<'a>(&mut self, step: usize, values: impl FnMut(usize, &Channel) -> Cow<'a, [f64]>) {
         if self.kept.len() >= self.most {
             self.interval *= 2;
             self.thin();
@@ -95,7 +97,7 @@ impl Frames {
     }
 
     /// Keeps the last frame, whatever its step.
-    pub fn keep_last(&mut self, step: usize, values: &[&[f64]]) {
+    pub fn keep_last<'a>(&mut self, step: usize, values: impl FnMut(usize, &Channel) -> Cow<'a, [f64]>) {
         self.kept.retain(|frame| frame.step < step);
         self.push(step, values);
     }
@@ -114,12 +116,12 @@ impl Frames {
         self.kept.extend(last);
     }
 
-    fn push(&mut self, step: usize, values: &[&[f64]]) {
+    fn push<'a>(&mut self, step: usize, mut values: impl FnMut(usize, &Channel) -> Cow<'a, [f64]>) {
         let before = self.kept.last();
-        let track = |(k, (channel, &values)): (usize, (&Channel, &&[f64]))| {
-            QuantizedChannel::of(values, channel.bits, before.map(|frame| &frame.tracks[k]))
+        let track = |(k, channel): (usize, &Channel)| {
+            QuantizedChannel::of(&values(k, channel), channel.bits, before.map(|frame| &frame.tracks[k]))
         };
-        let tracks = self.channels.iter().zip(values).enumerate().map(track).collect();
+        let tracks = self.channels.iter().enumerate().map(track).collect();
         self.kept.push(Frame { step, tracks });
     }
 
@@ -147,11 +149,11 @@ mod tests {
             let mut frames = Frames::new(1, vec![Channel { name: "dx", bits: 16 }]);
             for step in 0..=steps {
                 if frames.wants(step) {
-                    frames.keep(step, &[&[step as f64]]);
+                    frames.keep(step, |_, _| vec![step as f64].into());
                 }
                 assert!(frames.kept().len() <= MOST_FRAMES);
             }
-            frames.keep_last(steps, &[&[steps as f64]]);
+            frames.keep_last(steps, |_, _| vec![steps as f64].into());
             let kept: Vec<usize> = frames.kept().iter().map(|frame| frame.step).collect();
             let (last, even) = kept.split_last().expect("kept");
             assert_eq!(*last, steps);

@@ -19,17 +19,19 @@ use crate::continuum::run::Outcome;
 use crate::engine::Engine;
 use crate::engine::serde_impls;
 use crate::flock::action::ActionKind;
+use crate::flock::pseudo_energy::pe1;
 use crate::flock::role::Role;
 use crate::flock::rules::{Mean, Rotation};
-use crate::flock::strain::Strain;
+use crate::flock::strain::{Strain, strain};
+use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 use crate::material::elastic::{Constants, Plane};
 use crate::material::stress::StressState;
 use crate::scene::units::Units;
 use crate::scene::{LoadSteps, Scene};
 
-/// Up to so many particles everything has the bits from which the strains of a body that turns far are still
-/// exact; larger bodies have those that a screen can show, and the page says what that makes of strains.
+/// Up to so many particles everything has the bits from which the strains of a body that turns far can be computed;
+/// larger bodies have those that a screen can show, and strains of their own.
 const MOST_FINE: usize = 100_000;
 pub(super) const FINE_BITS: u32 = 24;
 const COARSE_BITS: u32 = 16;
@@ -61,15 +63,18 @@ pub struct AnimationState<'a> {
 
 /// Values that frames hold of each particle, of a body of so many.
 fn channels(scene: &Scene, total: usize, are_neighbours_known: bool, has_stresses: bool) -> Vec<Channel> {
-    let [bits, others] = if total <= MOST_FINE { [FINE_BITS; 2] } else { [COARSE_BITS, COLOUR_BITS] };
+    let is_fine = total <= MOST_FINE;
+    let [bits, others] = if is_fine { [FINE_BITS; 2] } else { [COARSE_BITS, COLOUR_BITS] };
     let channel = |name, bits| Channel { name, bits };
     let mut channels = vec![channel("dx", bits), channel("dy", bits), channel(PE2, others)];
-    // Neighbours that are found anew at every step, or are not in a sample, are known to the engine alone.
-    if !are_neighbours_known {
+    // Neighbours that are found anew at every step, or are not in a sample, are known to the engine alone; of coarser
+    // displacements strains would be those of the rounding.
+    let are_computed = are_neighbours_known && is_fine;
+    if !are_computed {
         channels.extend([PE1, STRAIN].map(|name| channel(name, others)));
     }
     // An increment costs more than its stress, a step less: of steps the page computes it, where it can.
-    let is_kept = !are_neighbours_known || scene.equilibrium.is_some() || stress(scene).is_none();
+    let is_kept = !are_computed || scene.equilibrium.is_some() || stress(scene).is_none();
     channels.extend((has_stresses && is_kept).then(|| channel(VON_MISES, others)));
     channels
 }
@@ -119,12 +124,7 @@ pub(in crate::export) fn packed(scene: &Scene, plan: &Plan) -> Packed {
     let of_frames = kept.map(|kept| kept * frames.bytes_of_one());
     let moving = (of_frames[1] / COMPRESSED).min(MOST_TEXT);
     let packing = exact.max(bonds).max((text + at_once * 4 * (2 * frames.channels.len() + 1)) * count);
-    Packed {
-        values: 8 * frames.channels.len() * count,
-        frames: of_frames,
-        packing: packing + moving,
-        text: text * count + moving,
-    }
+    Packed { values: 8 * count, frames: of_frames, packing: packing + moving, text: text * count + moving }
 }
 
 /// Keeps the frames of a run while it goes on.
@@ -135,7 +135,6 @@ pub struct RunRecorder {
     roles: Vec<Role>,
     /// Step, particle and role.
     changes: Vec<[u32; 3]>,
-    values: Vec<Vec<f64>>,
     is_solved: bool,
     /// Whether stress on the way is recovered along the outline, which takes longer than a step.
     is_recovered: bool,
@@ -151,12 +150,11 @@ impl RunRecorder {
         let are_neighbours_known = sample.is_none() && engine.lasting_neighbours().is_some();
         let channels = channels(scene, engine.body().total(), are_neighbours_known, engine.cells().is_some());
         let roles = roles(engine, sample.as_ref()).into_owned();
-        let values = vec![Vec::new(); channels.len()];
         let frames = Frames::new(count, channels);
         let first_roles = roles.clone();
         let is_recovered = scene.equilibrium.is_some();
         let (changes, is_solved) = (Vec::new(), false);
-        Self { frames, first_roles, roles, changes, values, is_solved, is_recovered, sample }
+        Self { frames, first_roles, roles, changes, is_solved, is_recovered, sample }
     }
 
     /// The recorder, made if there is none yet; it goes on from the state of an earlier one that showed the same particles.
@@ -183,11 +181,13 @@ impl RunRecorder {
     pub fn watch(&mut self, engine: &Engine) {
         if self.frames.wants(engine.step()) {
             let is_recovered = self.is_recovered;
-            self.take(engine, 1.0, || match is_recovered {
+            let stress = || match is_recovered {
                 true => von_mises(engine, 1.0),
                 false => Stresses::von_mises_of_cells(engine),
-            });
-            self.frames.keep(engine.step(), &slices(&self.values));
+            };
+            let seen = Seen::new(engine, self.sample.as_ref(), 1.0, &stress);
+            self.frames.keep(engine.step(), |_, channel| seen.values(channel).into());
+            self.take_roles(engine);
         }
     }
 
@@ -221,48 +221,23 @@ impl RunRecorder {
             if is_linear(scene) && self.is_exact() {
                 channels.retain(|channel| channel.name != VON_MISES);
             }
-            self.values.truncate(channels.len());
             self.frames = Frames::new(self.frames.count, channels);
             // What the page does not compute is known of the whole load.
             let first = if self.sample.is_some() { LOAD_FRAMES } else { 0 };
             let whole = OnceCell::new();
             for frame in first..=LOAD_FRAMES {
                 let part = frame as f64 / LOAD_FRAMES as f64;
-                self.take(engine, part, || match is_linear(scene) {
+                let stress = || match is_linear(scene) {
                     false => von_mises(engine, part),
                     true => whole.get_or_init(|| von_mises(engine, 1.0)).iter().map(|v| part * v).collect(),
-                });
-                self.frames.keep(frame, &slices(&self.values));
+                };
+                let seen = Seen::new(engine, self.sample.as_ref(), part, &stress);
+                self.frames.keep(frame, |_, channel| seen.values(channel).into());
             }
         } else {
-            self.take(engine, 1.0, || von_mises(engine, 1.0));
-            self.frames.keep_last(engine.step(), &slices(&self.values));
-        }
-        // Nothing is taken any more, and the page is yet to be packed.
-        self.values.iter_mut().for_each(|values| *values = Vec::new());
-    }
-
-    /// Values of every channel, displacements times `part`.
-    fn take(&mut self, engine: &Engine, part: f64, stress: impl Fn() -> Vec<f64>) {
-        let (present, reference, sample) = (engine.present(), &engine.body().reference, &self.sample);
-        let take = |values: &mut Vec<f64>, of: &(dyn Fn(usize) -> f64 + Sync)| match sample {
-            None => (0..reference.len()).into_par_iter().map(of).collect_into_vec(values),
-            Some(sample) => *values = sample.numbers(of),
-        };
-        let [dx, dy] = [(&present.x, &reference.x), (&present.y, &reference.y)]
-            .map(|(now, then)| move |i: usize| part * (now[i] - then[i]));
-        for (values, channel) in self.values.iter_mut().zip(&self.frames.channels) {
-            match channel.name {
-                "dx" => take(values, &dx),
-                "dy" => take(values, &dy),
-                PE1 => take(values, &|i| engine.pe1(i)),
-                PE2 => take(values, &|i| engine.pe2(i)),
-                STRAIN => take(values, &|i| engine.strain(i).map_or(f64::NAN, |strain| strain.largest())),
-                _ => {
-                    let stress = stress();
-                    take(values, &|i| stress.get(i).copied().unwrap_or(f64::NAN));
-                }
-            }
+            let stress = || von_mises(engine, 1.0);
+            let seen = Seen::new(engine, self.sample.as_ref(), 1.0, &stress);
+            self.frames.keep_last(engine.step(), |_, channel| seen.values(channel).into());
         }
         self.take_roles(engine);
     }
@@ -386,6 +361,68 @@ impl RunRecorder {
     }
 }
 
+/// What a frame is taken from.
+struct Seen<'a> {
+    engine: &'a Engine,
+    sample: Option<&'a Sample>,
+    /// The part of the displacements that there is.
+    part: f64,
+    /// Where particles are, if that is not all.
+    partly: OnceCell<Vectors>,
+    stress: &'a dyn Fn() -> Vec<f64>,
+}
+
+impl<'a> Seen<'a> {
+    fn new(
+        engine: &'a Engine,
+        sample: Option<&'a Sample>,
+        part: f64,
+        stress: &'a dyn Fn() -> Vec<f64>,
+    ) -> Self {
+        Self { engine, sample, part, partly: OnceCell::new(), stress }
+    }
+
+    /// Values of a channel, shape \[count\].
+    fn values(&self, channel: &Channel) -> Vec<f64> {
+        let Self { engine, part, .. } = *self;
+        let (flock, present, reference) = (engine.flock(), engine.present(), &engine.body().reference);
+        match channel.name {
+            "dx" => self.each(|i| part * (present.x[i] - reference.x[i])),
+            "dy" => self.each(|i| part * (present.y[i] - reference.y[i])),
+            PE1 => {
+                let places = self.places();
+                self.each(|i| pe1(flock, i, places))
+            }
+            PE2 => self.each(|i| engine.pe2(i)),
+            STRAIN => {
+                let places = self.places();
+                self.each(|i| strain(flock, i, places).map_or(f64::NAN, |strain| strain.largest()))
+            }
+            _ => {
+                let stress = (self.stress)();
+                self.each(|i| stress.get(i).copied().unwrap_or(f64::NAN))
+            }
+        }
+    }
+
+    fn places(&self) -> &Vectors {
+        let (present, reference) = (self.engine.present(), &self.engine.body().reference);
+        let along = |then: f64, now: f64| then + self.part * (now - then);
+        let partly = || {
+            let pairs = reference.iter().zip(present.iter());
+            pairs.map(|(then, now)| [along(then[0], now[0]), along(then[1], now[1])]).collect()
+        };
+        if self.part == 1.0 { present } else { self.partly.get_or_init(partly) }
+    }
+
+    fn each(&self, of: impl Fn(usize) -> f64 + Send + Sync) -> Vec<f64> {
+        match self.sample {
+            None => (0..self.engine.body().count()).into_par_iter().map(of).collect(),
+            Some(sample) => sample.numbers(&of),
+        }
+    }
+}
+
 /// The roles of the particles that are shown.
 fn roles<'a>(engine: &'a Engine, sample: Option<&Sample>) -> Cow<'a, [Role]> {
     let of_sample = |sample: &Sample| {
@@ -403,10 +440,6 @@ fn von_mises(engine: &Engine, part: f64) -> Vec<f64> {
     let particles = Stresses::under(engine, &displacement).map(|stresses| stresses.particles);
     let of = |stress: Option<StressState>| stress.map_or(f64::NAN, |stress| stress.von_mises);
     particles.map_or_else(Vec::new, |particles| particles.into_iter().map(of).collect())
-}
-
-fn slices(values: &[Vec<f64>]) -> Vec<&[f64]> {
-    values.iter().map(Vec::as_slice).collect()
 }
 
 /// Whether the equilibrium was found without intermediate states.
@@ -513,5 +546,48 @@ fn add_exact(stage: &mut View, scene: &Scene, engine: &Engine) {
         add("stress_yy", "stress yy", &unit, &mut of(|stress| stress.components[1]));
         add("stress_xy", "stress xy", &unit, &mut of(|stress| stress.components[2]));
         add(VON_MISES, "von Mises stress", &unit, &mut of(|stress| stress.von_mises));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use super::*;
+    use crate::continuum::equilibrium::run_to_equilibrium_watched;
+    use crate::engine::observer::EachStep;
+
+    /// Stretched by 1e-4 and turned by 90 degrees: strain and stress are the same everywhere.
+    #[test]
+    fn strains_of_a_large_body_that_turns_are_not_those_of_the_rounding() {
+        let text = r#"
+            title = "Steel"
+            material = { kind = "isotropic", young = 210e3, poisson = 0.0 }
+            rule = { mean = { kind = "material", rotation = "corotated" } }
+            lattice = { kind = "square", spacing = 1.0 }
+            body = { shape = { kind = "grid", columns = 1001, rows = 100 } }
+            stop.steps = 2
+            [[roles]]
+            region = { kind = "all" }
+            role = "leader"
+            motion = { kind = "affine", rotate = 90.0, stretch = [1.0001, 1.0], steps = 2 }
+            "#;
+        let scene = Scene::parse("steel", "steel", text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+        let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
+        assert!(plan.setup.body.count() > MOST_FINE);
+        let mut recorder = None;
+        let mut see = |engine: &Engine, _: f64| {
+            RunRecorder::open(&mut recorder, &mut None, (&scene, engine)).watch(engine);
+            ControlFlow::Continue(())
+        };
+        let outcome = run_to_equilibrium_watched(&scene, plan, &mut EachStep(&mut see)).expect("an end");
+        let mut recorder = recorder.expect("it has looked");
+        recorder.close(&scene, &outcome);
+        let last = recorder.frames().len() - 1;
+        for (quantity, expected) in [(STRAIN, 1e-4), (VON_MISES, 21.0)] {
+            let values = recorder.values(last, quantity).expect("kept");
+            let worst = values.iter().map(|value| (value / expected - 1.0).abs()).fold(0.0, f64::max);
+            assert!(worst < 1e-3, "{quantity}: {worst}");
+        }
     }
 }

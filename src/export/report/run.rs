@@ -6,9 +6,9 @@ use super::super::error::ExportError;
 use super::super::figures::{chart, probes};
 use super::super::load;
 use super::super::{OutputFolder, Results, Signed, Summary};
-use super::frames::MOST_FRAMES;
+use super::frames::{Channel, MOST_FRAMES};
 use super::page::{Page, file_texts, number};
-use super::recorder::{FINE_BITS, is_solved_at_once};
+use super::recorder::{STRAIN, is_solved_at_once};
 use super::sample::stride_of;
 use super::view::{Animation, View};
 use crate::continuum::run::{Outcome, StopReason};
@@ -109,15 +109,20 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
         );
         return note + before_the_last + " final.csv has all of them, to the last digit.";
     }
-    let computed = if animation.stress.is_some() { "PE1, strain and stress" } else { "PE1 and strain" };
-    note += &format!(
-        " Displacements are kept to {bits} bits of each frame's range; {computed} are computed from them."
-    );
-    let strain = largest_quantum(animation) / animation.spacing;
-    if bits < FINE_BITS {
-        let when = if animation.exact.is_empty() { "" } else { " before the last frame" };
-        note += &format!(" That leaves strains{when} uncertain by about {}.", number(strain));
-    }
+    note += &format!(" Displacements are kept to {bits} bits of each frame's range");
+    note += &match animation.channels.iter().find(|channel| channel.name == STRAIN) {
+        Some(Channel { bits, .. }) => format!(", other quantities to {bits}."),
+        None => {
+            let computed =
+                if animation.stress.is_some() { "PE1, strain and stress" } else { "PE1 and strain" };
+            let strain = largest_quantum(animation) / animation.spacing;
+            let when = if animation.exact.is_empty() { "" } else { " before the last frame" };
+            format!(
+                "; {computed} are computed from them, which leaves strains{when} uncertain by about {}.",
+                number(strain)
+            )
+        }
+    };
     note += before_the_last;
     note += if animation.exact.is_empty() {
         " The body is too large for its last numbers to be kept exactly: final.csv has them."

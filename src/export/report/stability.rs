@@ -53,14 +53,7 @@ fn tables(study: &Study) -> Vec<Table> {
         let rows = linear.thresholds.iter().map(|threshold| {
             let predicted = threshold.predicted.as_ref().map_or("none".into(), |p| exact(p.value));
             let found = threshold.found.as_ref().map_or("none".into(), |f| exact(f.value));
-            let agrees = if threshold.agrees() { "agree" } else { "DISAGREE" };
-            vec![
-                threshold.parameter.name().into(),
-                predicted,
-                found,
-                number(threshold.tolerance),
-                agrees.into(),
-            ]
+            vec![threshold.name(), predicted, found, number(threshold.tolerance), threshold.verdict()]
         });
         let head = ["parameter", "predicted by the spectrum", "found by runs", "may differ by", ""];
         tables.push(Table::new("Thresholds", &head, rows));

@@ -48,10 +48,9 @@ fn tables(study: &Study) -> Vec<Table> {
     ];
     let row = |point: &Point| {
         let setting = &point.setting;
-        let outcome = match &point.outcome {
-            Outcome::Settled => "settled".to_owned(),
-            Outcome::Unsettled => "unsettled".to_owned(),
-            Outcome::Refused { reason } => format!("refused: {reason}"),
+        let outcome = match point.outcome.words() {
+            (name, "") => name.to_owned(),
+            (name, reason) => format!("{name}: {reason}"),
         };
         vec![
             setting.rule.name().into(),

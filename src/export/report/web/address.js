@@ -1,6 +1,6 @@
 // What is shown, kept in the address of the page: the same address shows the same.
 
-import { refit, turn } from "./camera.js";
+import { look, refit, turn } from "./camera.js";
 import { compare, moveEdge } from "./compare.js";
 import { choose } from "./controls.js";
 import { draw } from "./page.js";
@@ -72,8 +72,7 @@ function recall() {
   turn(asked.turned === "1");
   const [x, y, width] = asked.view.split(",").map(Number);
   if (asked.view && [x, y, width].every(Number.isFinite) && width > 0) {
-    state.camera = { x, y, scale: shown.views[0].width / width };
-    state.isFitted = false;
+    look({ x, y, scale: shown.views[0].width / width });
   } else refit();
   draw();
 }

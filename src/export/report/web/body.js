@@ -185,11 +185,17 @@ export class Body {
     else if (this.frames.has(key)) this.frames.read(key, this.at, out);
     else if (key === "displacement") for (let i = 0; i < this.count; i++) out[i] = Math.hypot(this.dx[i], this.dy[i]);
     else if (key === "pe1") this.pe1(out);
-    else if (key === "strain") this.eachStrain((i, xx, yy, xy) => {
-      out[i] = Math.abs(xx + yy) / 2 + Math.hypot((xx - yy) / 2, xy);
-    }, out);
+    else if (key === "strain") this.strain(out);
     else if (key === "von_mises" && this.animation.stress) this.vonMises(out);
     else out.fill(NaN);
+  }
+
+  // The principal strain largest in size: from what is exact, or from displacements.
+  strain(out) {
+    const largest = (xx, yy, xy) => Math.abs(xx + yy) / 2 + Math.hypot((xx - yy) / 2, xy);
+    const exact = ["xx", "yy", "xy"].map((component) => this.exact.get(`strain_${component}`));
+    if (this.at === this.last && exact.every(Boolean)) for (let i = 0; i < this.count; i++) out[i] = largest(...exact.map((one) => one[i]));
+    else this.eachStrain((i, xx, yy, xy) => (out[i] = largest(xx, yy, xy)), out);
   }
 
   // PE1(j) = sum over living bonds of (d - d0)^2.

@@ -39,19 +39,28 @@ export function follow() {
   else state.camera = { x: (low[0] + high[0]) / 2, y: (low[1] + high[1]) / 2, scale };
 }
 
+// Pixels of a unit of length at most: beyond, places cannot be told apart.
+function mostPixels({ x, y }) {
+  return 2 ** 44 / Math.max(Math.abs(x), Math.abs(y), bodies[0].animation.spacing || 1e-3);
+}
+
+// Takes this camera up, from no nearer than there is anything to be seen.
+export function look(camera) {
+  state.camera = { ...camera, scale: Math.min(camera.scale, mostPixels(camera)) };
+  state.isFitted = false;
+}
+
 export function zoom(by, view = shown.views[0], at = [view.width / 2, view.height / 2]) {
   const { camera } = state;
   const [ox, oy] = [at[0] - view.width / 2, view.height / 2 - at[1]];
-  const scale = camera.scale * by;
-  state.camera = { x: camera.x + ox / camera.scale - ox / scale, y: camera.y + oy / camera.scale - oy / scale, scale };
-  state.isFitted = false;
+  const scale = Math.min(camera.scale * by, mostPixels(camera));
+  look({ x: camera.x + ox / camera.scale - ox / scale, y: camera.y + oy / camera.scale - oy / scale, scale });
   draw();
 }
 
 export function move(dx, dy) {
   const { camera } = state;
-  state.camera = { ...camera, x: camera.x - dx / camera.scale, y: camera.y + dy / camera.scale };
-  state.isFitted = false;
+  look({ ...camera, x: camera.x - dx / camera.scale, y: camera.y + dy / camera.scale });
   draw();
 }
 

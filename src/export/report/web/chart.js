@@ -1,6 +1,6 @@
 // Charts as SVG: lines and points over two axes, with the animation's clock as a line to drag.
 
-import { logTicks, ticks, words } from "./colour.js";
+import { logTicks, placeWords, ticks, words } from "./colour.js";
 
 const HEIGHT = 300;
 const ROOM = { top: 10, right: 16, bottom: 42 };
@@ -97,14 +97,20 @@ export class Chart {
     const marks = (axis, [low, high], most) =>
       axis.log ? logTicks(10 ** low, 10 ** high, most) : ticks(low, high, most);
     const yTicks = marks(plot.y, ys, 6);
-    const left = Math.max(...yTicks.map((value) => words(value).length), 3) * 7.2 + 30;
+    // Ticks that lie near each other take more digits to be told apart.
+    const named = (axis, all) => {
+      const step = all[1] - all[0];
+      return all.map((value) => [value, axis.log || !(step > 0) ? words(value, 4) : placeWords(value, step)]);
+    };
+    const yNames = named(plot.y, yTicks);
+    const left = Math.max(...yNames.map(([, name]) => name.length), 3) * 7.2 + 30;
     const room = { ...ROOM, left };
     const size = [width - room.left - room.right, HEIGHT - room.top - room.bottom];
     const x = (value) => room.left + (((plot.x.log ? Math.log10(value) : value) - xs[0]) / (xs[1] - xs[0])) * size[0];
     const y = (value) => room.top + (1 - ((plot.y.log ? Math.log10(value) : value) - ys[0]) / (ys[1] - ys[0])) * size[1];
     Object.assign(this, { x, y, xs, ys, room, size });
     const root = svg("svg", { viewBox: `0 0 ${width} ${HEIGHT}`, width, height: HEIGHT, role: "img", "aria-label": this.words() });
-    this.drawAxes(root, marks(plot.x, xs, width / 90), yTicks);
+    this.drawAxes(root, named(plot.x, marks(plot.x, xs, width / 90)), yNames);
     plot.landmarks.forEach(({ x: at, name }, row) => {
       svg("line", { x1: x(at), x2: x(at), y1: room.top, y2: room.top + size[1], stroke: "var(--soft)", "stroke-dasharray": "5 4" }, root);
       const end = x(at) > room.left + 0.6 * size[0];
@@ -137,13 +143,13 @@ export class Chart {
   drawAxes(root, xTicks, yTicks) {
     const { plot, x, y, room, size } = this;
     const [right, bottom] = [room.left + size[0], room.top + size[1]];
-    for (const value of yTicks) {
+    for (const [value, name] of yTicks) {
       svg("line", { x1: room.left, x2: right, y1: y(value), y2: y(value), stroke: "var(--grid)" }, root);
-      svg("text", { x: room.left - 6, y: y(value) + 4, "text-anchor": "end" }, root).textContent = words(value, 4);
+      svg("text", { x: room.left - 6, y: y(value) + 4, "text-anchor": "end" }, root).textContent = name;
     }
-    for (const value of xTicks) {
+    for (const [value, name] of xTicks) {
       svg("line", { x1: x(value), x2: x(value), y1: room.top, y2: bottom, stroke: "var(--grid)" }, root);
-      svg("text", { x: x(value), y: bottom + 16, "text-anchor": "middle" }, root).textContent = words(value, 4);
+      svg("text", { x: x(value), y: bottom + 16, "text-anchor": "middle" }, root).textContent = name;
     }
     svg("rect", { x: room.left, y: room.top, width: size[0], height: size[1], fill: "none", stroke: "var(--line)" }, root);
     const named = ({ quantity, unit }) => (unit ? `${quantity} [${unit}]` : quantity);

@@ -61,11 +61,20 @@ export function placeWords(value, part) {
 export function ticks(low, high, most) {
   const raw = (high - low) / Math.max(most, 1);
   if (!(raw > 0) || !Number.isFinite(raw)) return [low];
+  // Numbers of these digits cannot be told apart any more.
+  if (raw < 2 ** -48 * Math.max(Math.abs(low), Math.abs(high))) return [low];
   const decade = 10 ** Math.floor(Math.log10(raw));
   const step = [1, 2, 5, 10].map((m) => m * decade).find((s) => s >= raw * 0.999);
-  const values = [];
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) values.push(k === 0 ? 0 : k * step);
-  return values;
+  return multiples(low, high, step);
+}
+
+// The multiples of a step from low to high.
+export function multiples(low, high, step) {
+  const first = Math.ceil(low / step - 1e-9);
+  const count = Math.floor(high / step + 1e-9) - first + 1;
+  // Beyond 2^53 a number and the next one are the same.
+  const isCounted = count > 0 && Math.max(Math.abs(first), Math.abs(first + count)) < 2 ** 52;
+  return Array.from({ length: isCounted ? count : 0 }, (_, k) => (first + k) * step || 0);
 }
 
 // Powers of ten from low to high, no more than `most`; round values where the range holds fewer than two.

@@ -105,7 +105,8 @@ export function shade(body, out) {
   if (isLog()) {
     const top = Math.log10(high);
     for (let i = 0; i < out.length; i++) {
-      const part = 1 + (Math.log10(Math.abs(field[i])) - top) / DECADES;
+      // What is below nothing is at the bottom with nothing.
+      const part = 1 + (Math.log10(Math.max(field[i], 0)) - top) / DECADES;
       out[i] = Number.isNaN(part) ? -1 : Math.min(Math.max(part, 0), 1);
     }
   } else {

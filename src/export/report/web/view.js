@@ -3,7 +3,7 @@
 import { Painter } from "./painter.js";
 import { PlainPainter } from "./painter2d.js";
 import { marksOf } from "./marks.js";
-import { placeWords, themeColour, themeText, ticks, words } from "./colour.js";
+import { multiples, placeWords, themeColour, themeText, ticks, words } from "./colour.js";
 import { shown } from "./shown.js";
 
 // Ways of more particles would cover each other.
@@ -223,8 +223,7 @@ export class View {
     // On a phone too there are two of them, whose distance is that of the others.
     const across = ticks(camera.x - halfWidth, camera.x + halfWidth, Math.max(this.width / 110, 4));
     const step = across.length > 1 ? across[1] - across[0] : 1;
-    const up = [];
-    for (let k = Math.ceil((camera.y - halfHeight) / step); k * step <= camera.y + halfHeight; k++) up.push(k * step);
+    const up = across.length > 1 ? multiples(camera.y - halfHeight, camera.y + halfHeight, step) : [];
     pen.lineWidth = 1;
     pen.strokeStyle = themeText("grid");
     pen.fillStyle = themeText("soft");
