@@ -22,8 +22,10 @@ pub(crate) const METADATA: &str = "flockform";
 pub(crate) const TAKEN_OVER: &str = "taken_over";
 /// Name of the attachment that is the swarm file.
 pub const SWARM: &str = "swarm.toml";
-/// Bytes before compression that are written at once: what a killed program loses.
+/// Most bytes before compression that are written at once.
 const CHUNK: u64 = 256 << 10;
+/// Time of the recording after which what there is of it is written, so that a killed program loses no more \[ns\].
+const FLUSHED_EVERY: u64 = 1_000_000_000;
 
 /// The subject of a recording.
 #[derive(Clone, Debug, Default)]
@@ -54,6 +56,8 @@ pub struct Recording {
     writer: Writer<BufWriter<File>>,
     channels: BTreeMap<String, Channel>,
     span: Span,
+    /// When what there was had been written \[ns\].
+    flushed: Option<u64>,
     failure: Option<mcap::McapError>,
     messages: u64,
 }
@@ -79,7 +83,7 @@ impl Recording {
         let mut writer = options.create(BufWriter::new(file)).map_err(write)?;
         describe(&mut writer, about).map_err(write)?;
         let (path, channels, span) = (path.to_owned(), BTreeMap::new(), Span::default());
-        Ok(Self { path, part, force, writer, channels, span, failure: None, messages: 0 })
+        Ok(Self { path, part, force, writer, channels, span, flushed: None, failure: None, messages: 0 })
     }
 
     /// The file that is written, until it is whole.
@@ -118,6 +122,12 @@ impl Recording {
         channel.messages += 1;
         self.span.add(header.log_time);
         self.messages += 1;
+        let flushed = *self.flushed.get_or_insert(header.log_time);
+        // Either way: a clock may have been set back.
+        if header.log_time.abs_diff(flushed) >= FLUSHED_EVERY {
+            self.writer.flush()?;
+            self.flushed = Some(header.log_time);
+        }
         self.writer.write_to_known_channel(&header, taped.payload)
     }
 

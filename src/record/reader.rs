@@ -111,7 +111,7 @@ impl Reader {
     }
 
     /// The header before the first message.
-    pub fn described(&self) -> Result<Described, RecordError> {
+    pub fn described(&self) -> Described {
         let mut described = Described::default();
         // What comes before damage is as good as ever.
         let _ = self.scan(&mut |record| {
@@ -127,22 +127,22 @@ impl Reader {
             }
             ControlFlow::Continue(())
         });
-        Ok(described)
+        described
     }
 
     /// An error of what can be read, with the damage that ends it, if the file is damaged: what is lacking may have come after.
     pub(super) fn after_damage(&self, error: RecordError) -> RecordError {
         match self.each(&mut |_| {}) {
-            Ok(Some(damage)) => {
+            Some(damage) => {
                 RecordError::BreaksOff { path: self.path.clone(), damage, error: Box::new(error) }
             }
-            _ => error,
+            None => error,
         }
     }
 
     /// Shows every CDR message to `see`, in the order of the file, until it is damaged or ends. Returns what is
     /// wrong with its end, if anything is: damage behind the last message is none.
-    pub fn each(&self, see: &mut dyn FnMut(&Entry)) -> Result<Option<String>, RecordError> {
+    pub fn each(&self, see: &mut dyn FnMut(&Entry)) -> Option<String> {
         let mut kinds: BTreeMap<u16, Arc<str>> = BTreeMap::new();
         let mut channels: BTreeMap<u16, (Arc<str>, Arc<str>)> = BTreeMap::new();
         let mut is_closed = false;
@@ -168,10 +168,10 @@ impl Reader {
             }
             ControlFlow::Continue(())
         });
-        Ok(match scanned {
+        match scanned {
             Err(error) => (!is_closed).then(|| error.to_string()),
             Ok(()) => (!is_closed).then(|| "it was never closed".to_owned()),
-        })
+        }
     }
 
     /// The file that is read.

@@ -15,7 +15,7 @@ use super::{Entry, Reader, RecordError};
 use crate::flock::vectors::distance;
 use crate::messages::builtin_interfaces::Time;
 use crate::messages::flockform_msgs::{LoopEvent, Ranges, SetFormationRequest};
-use crate::messages::formation::leaders::set_formation;
+use crate::messages::formation::leaders::requested;
 use crate::messages::formation::{NAME, pose, ranges};
 use crate::messages::geometry_msgs::{self, PoseArray, PoseStamped};
 use crate::messages::names::Names;
@@ -95,7 +95,7 @@ impl Report {
 /// # Errors
 /// A recording without a swarm; what the overrides make of it.
 pub fn recorded_swarm(reader: &Reader, set: &[String]) -> Result<Swarm, RecordError> {
-    let described = reader.described()?;
+    let described = reader.described();
     let nameless = || RecordError::NoSwarm(reader.path().to_owned());
     let text = described.swarm.ok_or_else(nameless).map_err(|error| reader.after_damage(error))?;
     let of = |key: &str| described.metadata.get(key).cloned();
@@ -112,7 +112,7 @@ pub fn recorded_swarm(reader: &Reader, set: &[String]) -> Result<Swarm, RecordEr
 /// A recording of other topics than this swarm's, or of a loop that was not at work.
 pub fn replay(reader: &Reader, swarm: &Swarm, tolerance: f64) -> Result<Report, RecordError> {
     let mut replay = Replay::new(reader, swarm, tolerance)?;
-    let damage = reader.each(&mut |entry| replay.see(entry))?;
+    let damage = reader.each(&mut |entry| replay.see(entry));
     if damage.is_none() {
         // Of a file that breaks off, the last tick may not be whole.
         replay.compare();
@@ -191,7 +191,7 @@ struct Replay {
 
 impl Replay {
     fn new(reader: &Reader, swarm: &Swarm, tolerance: f64) -> Result<Self, RecordError> {
-        let described = reader.described()?;
+        let described = reader.described();
         let mut control = Control::new(swarm)?;
         let flown = described.swarm.as_ref().map(|_| recorded_swarm(reader, &[])).transpose()?;
         let before = flown.as_ref().map_or_else(|| Ok(control.clone()), Control::new)?;
@@ -358,7 +358,7 @@ impl Replay {
     /// is changed again.
     fn parameter(&mut self, name: &str, value: f64) {
         let of = |all: &[(&str, f64)]| all.iter().find(|(one, _)| *one == name).map(|(_, value)| *value);
-        let (then, today) = (of(&self.as_recorded), of(&parameters(&self.control)));
+        let (then, today) = (of(&self.as_recorded), of(&parameters(&self.fresh)));
         let is_changed_since = then.map(f64::to_bits) != today.map(f64::to_bits);
         if !self.begun && is_changed_since {
             return;
@@ -369,13 +369,12 @@ impl Replay {
     }
 
     fn move_leaders(&mut self, request: &SetFormationRequest) {
-        let time = self.control.program_time();
         // Whether it can be flown was asked in the flight, with the limits of then.
-        let named = self.control.formation().manoeuvre(&request.name, time);
-        if let Some(manoeuvre) = named.filter(|_| self.control.formation().is_led_here()) {
-            self.control.begin(&manoeuvre);
-        } else if let Err(why) = set_formation(&mut self.control, request) {
-            self.refusal.get_or_insert(format!("the leaders cannot move as they did: {why}"));
+        match requested(&self.control, request) {
+            Ok(manoeuvre) => self.control.begin(&manoeuvre),
+            Err(why) => {
+                self.refusal.get_or_insert(format!("the leaders cannot move as they did: {why}"));
+            }
         }
     }
 

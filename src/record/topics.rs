@@ -50,7 +50,7 @@ pub(super) fn topics(
         if &*entry.kind == "flockform_msgs/LoopEvent" && entry.topic.ends_with(leaf) {
             topics.insert(entry.topic.to_string(), Heard::Events);
         }
-    })?;
+    });
     let has_events = !topics.is_empty();
     topics.extend(of_robots(swarm, control, names)?);
     Ok((topics, has_events))

@@ -189,7 +189,7 @@ fn a_recording_has_the_particles_in_the_order_of_the_file() {
             members.get_or_insert(message);
         }
     });
-    assert_eq!(damage.expect("readable"), None);
+    assert_eq!(damage, None);
     let (poses, state) = (poses.expect("poses"), members.expect("members"));
     assert_eq!((poses.poses.len(), state.members.len()), (rows.len(), rows.len()));
     for (n, (id, [x, y])) in rows.iter().enumerate() {

@@ -8,8 +8,9 @@ use flockform::messages::diagnostic_msgs::DiagnosticArray;
 use flockform::messages::flockform_msgs::{FormationState, LoopEvent};
 use flockform::messages::geometry_msgs::{PoseArray, PoseStamped, PoseWithCovarianceStamped};
 use flockform::messages::nav_msgs::Odometry;
+use flockform::messages::recorder::RecordedMessage;
 use flockform::messages::visualization_msgs::MarkerArray;
-use flockform::record::{Entry, Reader};
+use flockform::record::{About, Entry, Reader, Recording};
 
 use crate::program::*;
 
@@ -48,7 +49,7 @@ fn expected(recording: &Path, into: &Path) -> Vec<(String, usize)> {
             None => topics.push((entry.topic.to_string(), 1)),
         }
     });
-    assert_eq!(damage.expect("readable"), None);
+    assert_eq!(damage, None);
     topics
 }
 
@@ -76,6 +77,33 @@ fn a_flight_s_recording_has_the_topics_of_the_live_node() {
     assert!(count("/flockform/state").is_some() && count("/flockform/markers").is_some(), "{topics:?}");
     assert!(count("/diagnostics").is_some(), "{topics:?}");
     assert!(!folder.path().join("f.mcap.part").exists());
+}
+
+#[test]
+fn a_killed_program_s_recording_lacks_its_last_second_at_most() {
+    let folder = temporary();
+    let path = folder.path().join("f.mcap");
+    let about = About { source: "node", ..About::default() };
+    let mut recording = Recording::create(&path, &about, false).expect("created");
+    for tick in 0..48 {
+        let time = 100.0 + 0.05 * f64::from(tick);
+        recording.write(&RecordedMessage {
+            topic: "/robot_1/pose",
+            package: "geometry_msgs",
+            name: "PoseStamped",
+            payload: &[0, 1, 0, 0],
+            reliable: false,
+            time,
+            published: time,
+        });
+    }
+    let part = recording.part().to_owned();
+    // Nothing of it is run any more.
+    std::mem::forget(recording);
+    let mut seen = 0;
+    let damage = Reader::open(&part).expect("readable").each(&mut |_| seen += 1);
+    assert!(damage.is_some());
+    assert!((29..48).contains(&seen), "{seen}");
 }
 
 /// With an index of it all: readers that seek, as rosbag2 does, need not repair the file.

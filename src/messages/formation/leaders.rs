@@ -24,21 +24,34 @@ pub fn as_event(request: &SetFormationRequest) -> (u8, String, Vec<f64>) {
 /// # Errors
 /// Why they do not move.
 pub fn set_formation(control: &mut Control, request: &SetFormationRequest) -> Result<String, String> {
+    let manoeuvre = requested(control, request)?;
+    // What the file's own leaders fly is planned with cautions; it is not checked here.
+    let is_named = !request.name.is_empty();
+    let remedy = if is_named { "its legs would have to take" } else { "give a duration of" };
+    check_flyable(control, &manoeuvre, remedy)?;
+    control.begin(&manoeuvre);
+    let duration = number(manoeuvre.duration());
+    Ok(match is_named {
+        true => format!("manoeuvre `{}`, {duration} s", request.name),
+        false => format!("under way for {duration} s"),
+    })
+}
+
+/// The manoeuvre that the service is asked for, whether it can be flown or not.
+///
+/// # Errors
+/// Why it is none.
+pub(crate) fn requested(control: &Control, request: &SetFormationRequest) -> Result<Manoeuvre, String> {
     if !control.formation().is_led_here() {
         return Err("the leaders are moved by a scene's program".into());
     }
     let time = control.program_time();
     if !request.name.is_empty() {
-        let manoeuvre = control.formation().manoeuvre(&request.name, time);
-        let manoeuvre = manoeuvre.ok_or_else(|| {
+        return control.formation().manoeuvre(&request.name, time).ok_or_else(|| {
             let known: Vec<&str> =
                 control.formation().manoeuvres.iter().map(|manoeuvre| manoeuvre.name.as_str()).collect();
             format!("there is no manoeuvre `{}`; there are: {}", said(&request.name), known.join(", "))
-        })?;
-        // What the file's own leaders fly is planned with cautions; it is not checked here.
-        check_flyable(control, &manoeuvre, "its legs would have to take")?;
-        control.begin(&manoeuvre);
-        return Ok(format!("manoeuvre `{}`, {} s", request.name, number(manoeuvre.duration())));
+        });
     }
     let SetFormationRequest { translate, rotate, stretch, shear, duration, .. } = *request;
     let numbers = [translate[0], translate[1], rotate, stretch[0], stretch[1], shear[0], shear[1], duration];
@@ -55,10 +68,7 @@ pub fn set_formation(control: &mut Control, request: &SetFormationRequest) -> Re
     let posture = Posture { translate, rotate, stretch, shear };
     let from = control.formation().posture(about, time);
     let leg = Leg { seconds: duration, hold: 0.0, posture };
-    let manoeuvre = Manoeuvre { about, from, legs: vec![leg] };
-    check_flyable(control, &manoeuvre, "give a duration of")?;
-    control.begin(&manoeuvre);
-    Ok(format!("under way for {} s", number(duration)))
+    Ok(Manoeuvre { about, from, legs: vec![leg] })
 }
 
 /// Moments of a leg whose places are looked at.
