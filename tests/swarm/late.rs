@@ -113,6 +113,50 @@ fn robots_of_any_pace_keep_clear_behind_late_poses_and_commands() {
     assert!(met[0] < 0.12 && met[1] < 0.5, "they met: {met:?}");
 }
 
+/// Where a robot is seen farther back than before, its room seems to end before its last target.
+#[test]
+fn targets_do_not_leap_back_where_the_ages_of_poses_vary() {
+    let mut largest = [0.0_f64; 2];
+    for seed in 0..40_u64 {
+        let mut random = Pcg64Mcg::seed_from_u64(seed);
+        let alone = seed as usize % 2;
+        let mut controls = loops(&circle("integrator\""), alone == 1);
+        let places = controls[0].formation().places.clone();
+        for k in 0..ROBOTS {
+            let goal = places.get(k).map(|x| -x + random.random_range(-0.5..0.5));
+            controls.iter_mut().for_each(|control| assert!(control.place_leader(k, goal)));
+        }
+        let mut poses = vec![places; 1];
+        let mut before: Vec<Option<[f64; 2]>> = vec![None; ROBOTS];
+        for tick in 0_usize..200 {
+            let now = tick as f64 * PERIOD;
+            for k in 0..ROBOTS {
+                let old = tick.saturating_sub(random.random_range(0..3));
+                let stamp = old as f64 * PERIOD;
+                let pose = Pose { position: poses[old].get(k), yaw: 0.0, stamp, frame_is_right: true };
+                controls.iter_mut().for_each(|control| control.receive(k, pose, now).unwrap_or(()));
+            }
+            controls.iter_mut().for_each(|control| control.tick(now));
+            let mut next = poses[tick].clone();
+            for (k, before) in before.iter_mut().enumerate() {
+                let Some(target) = controls[k.min(controls.len() - 1)].target(k) else { continue };
+                let leap = before.replace(target).map_or(0.0, |before| distance(before, target));
+                largest[alone] = largest[alone].max(leap);
+                let (here, way) = (next.get(k), distance(next.get(k), target));
+                let share = if way > 0.0 { (PERIOD / way).min(1.0) } else { 0.0 };
+                next.set(k, [0, 1].map(|axis| here[axis] + share * (target[axis] - here[axis])));
+            }
+            for (a, b) in (0..ROBOTS).flat_map(|a| (0..a).map(move |b| (a, b))) {
+                let gap = distance(next.get(a), next.get(b)) - 0.3;
+                assert!(gap >= 0.1 - 1e-9, "seed {seed}, tick {tick}: r{a} and r{b} {gap} m apart");
+            }
+            poses.push(next);
+        }
+    }
+    println!("{largest:?}");
+    assert!(largest[0] < 1.5 * PERIOD && largest[1] < 2.0 * PERIOD, "{largest:?} m");
+}
+
 /// Discs that grow with the ages of poses filled the gap, and the robots stood before it, or wandered.
 #[test]
 fn swarms_with_late_poses_fly_as_others_do() {
@@ -367,6 +411,33 @@ fn a_lower_speed_limit_sends_no_robot_back() {
             let least = if tick < 50 { 0.0 } else { 0.99 * most };
             assert!((least..=most + 1e-9).contains(&step), "{late} late: {step} m in tick {tick}");
             poses.push(next);
+        }
+    }
+}
+
+/// It would leap there when it comes free.
+#[test]
+fn a_stuck_robot_s_target_comes_nearer_where_the_speed_limit_is_lowered() {
+    for late in [1, 5, 9] {
+        let mut control = Control::new(&circle("integrator\"")).expect("laid out");
+        assert!(control.place_leader(0, [40.0, 0.0]));
+        let stuck = control.formation().places.get(0);
+        for tick in 0..60_usize {
+            let now = tick as f64 * PERIOD;
+            if let Some(old) = tick.checked_sub(late) {
+                hear(&mut control, stuck, old as f64 * PERIOD, now);
+            }
+            for speed in if tick == 40 { &[0.6, 0.1][..] } else { &[] } {
+                control.set_limits(Limits { speed: *speed, ..control.limits().clone() }).expect("limits");
+            }
+            control.tick(now);
+            let Some(target) = control.target(0) else { continue };
+            // A period after that of its pose it can have gone on by the new limit alone.
+            let (ahead, time) = (target[0] - stuck[0], (late + 1) as f64 * PERIOD);
+            let since = (tick as f64 - 40.0) * PERIOD;
+            let most = 0.1 * since.clamp(0.0, time) + (time - since.max(0.0)).max(0.0);
+            let next = PERIOD * if since < 0.0 { 1.0 } else { 0.1 };
+            assert!(ahead <= most + next + 1e-9, "{late} late: {ahead} m ahead in tick {tick}, {most} m");
         }
     }
 }

@@ -3,11 +3,14 @@
 //! A period has four parts: the members' poses; their targets by the rule ([`Formation::advance`]); new targets for
 //! members with lost or faulty neighbours; safe targets ([`Filter`]). A member whose pose is not usable gets no target.
 
+mod programs;
 pub mod scope;
 mod setup;
 pub mod state;
 
 use serde::{Deserialize, Serialize};
+
+use programs::{Heard, Programs};
 
 use super::formation::{Formation, LeadSnapshot, Measures, Seen};
 use super::robots::{DoubleIntegrator, Robot};
@@ -103,18 +106,7 @@ pub struct Control {
     is_stopped: bool,
     is_active: bool,
     ticks: u64,
-    /// Periods run since the period last changed: the leaders' programs stand still in an emergency stop.
-    run: u64,
-    /// Time run before that \[s\].
-    run_before: f64,
-    /// Periods run since the beginning.
-    periods: u64,
-    /// Whether the programs have begun: see [`Control::may_begin`].
-    begun: bool,
-    /// Whether they had begun in an earlier loop of which this is the continuation.
-    goes_on: bool,
-    /// When all leaders had first been heard \[s\].
-    led_since: Option<f64>,
+    programs: Programs,
     /// Members whose poses this loop receives.
     listens: Vec<bool>,
     starts: Vec<Start>,
@@ -160,12 +152,7 @@ impl Control {
             is_stopped: false,
             is_active: true,
             ticks: 0,
-            run: 0,
-            run_before: 0.0,
-            periods: 0,
-            begun: false,
-            goes_on: false,
-            led_since: None,
+            programs: Programs::default(),
             listens: vec![true; count],
             starts,
             now: 0.0,
@@ -238,12 +225,12 @@ impl Control {
 
     /// Time that the leaders' programs have run \[s\].
     pub fn program_time(&self) -> f64 {
-        self.run_before + self.run as f64 * self.period
+        self.programs.time(self.period)
     }
 
     /// Changes the time between two ticks \[s\] from the next one on.
     pub fn set_period(&mut self, period: f64) {
-        (self.run_before, self.run) = (self.program_time(), 0);
+        self.programs.before_another(self.period);
         self.filter.stretch_period(period / self.period);
         self.period = period;
     }
@@ -363,9 +350,9 @@ impl Control {
         ControlSnapshot {
             is_stopped: self.is_stopped,
             program_time: self.program_time(),
-            periods: self.periods,
+            periods: self.programs.periods(),
             leads: self.formation.kept_leads(),
-            has_begun: self.begun || self.goes_on,
+            has_begun: self.programs.had_begun(),
             places: (0..self.formation.count())
                 .map(|member| self.watch.place(member).unwrap_or(self.starts[member].place))
                 .collect(),
@@ -375,9 +362,8 @@ impl Control {
     /// Continues from the state of an earlier loop of the same swarm; an emergency stop holds every member at its
     /// next accepted pose.
     pub fn restore(&mut self, kept: ControlSnapshot) {
-        (self.run_before, self.run, self.periods) = (kept.program_time, 0, kept.periods);
+        self.programs = Programs::continued(kept.program_time, kept.periods, kept.has_begun);
         self.formation.restore(kept.leads, kept.periods);
-        self.goes_on = kept.has_begun;
         for (member, place) in (0..self.starts.len()).zip(kept.places) {
             self.leave_at(member, place);
         }
@@ -408,7 +394,7 @@ impl Control {
 
     /// Whether those that are waited for have been heard, so that the leaders' programs run.
     pub fn has_begun(&self) -> bool {
-        self.begun
+        self.programs.have_begun()
     }
 
     /// The limits that the filter enforces.
@@ -557,14 +543,12 @@ impl Control {
     }
 
     fn follow(&mut self) {
-        // A program that ran before its leaders were up would be over before they could follow it.
-        self.begun |= self.may_begin();
-        if !self.begun {
+        let Self { formation, listens, known, programs, .. } = self;
+        let heard = || heard(formation, listens, known);
+        if !programs.run(self.now, heard) {
             self.wanted.clone_from(&self.present);
             return;
         }
-        self.run += 1;
-        self.periods += 1;
         let time = self.program_time();
         let seen = Seen { present: &self.present, known: &self.known };
         let mut among = Vec::new();
@@ -580,27 +564,6 @@ impl Control {
         for one in among.iter().filter(|one| one.is_trimmed) {
             self.flags[one.member] |= Flags::TRIMMED;
         }
-    }
-
-    /// Whether the programs may begin: all leaders are heard and the others too, or not for some seconds. To begin among robots
-    /// that are about to be heard would lead those that are around them.
-    fn may_begin(&mut self) -> bool {
-        /// \[s\]
-        const PATIENCE: f64 = 5.0;
-        let awaited = |m: usize| self.listens[m] && !self.known[m];
-        let mut awaited = (0..self.formation.count()).filter(|&m| awaited(m)).peekable();
-        if awaited.peek().is_none() {
-            return true;
-        }
-        // A leader that is lost on the way holds up no program, nor does it where an earlier loop had begun and another is heard.
-        let is_led = (0..self.known.len()).any(|m| self.known[m] && self.formation.leads(m));
-        if !(self.goes_on && is_led) && awaited.any(|m| self.formation.leads(m)) {
-            self.led_since = None;
-            return false;
-        }
-        let since = self.led_since.filter(|&since| since <= self.now).unwrap_or(self.now);
-        self.led_since = Some(since);
-        self.now - since >= PATIENCE
     }
 
     /// The member's safe target \[m\]; `None` without a usable pose, and while the loop is inactive.
@@ -691,4 +654,16 @@ impl Control {
         }
         places
     }
+}
+
+/// Those heard, of the members that this loop listens to.
+fn heard(formation: &Formation, listens: &[bool], known: &[bool]) -> Heard {
+    let (mut all, mut every_leader, mut a_leader) = (true, true, false);
+    for (m, (&known, &listens)) in known.iter().zip(listens).enumerate() {
+        let (awaited, leads) = (listens && !known, formation.leads(m));
+        all &= !awaited;
+        every_leader &= !(awaited && leads);
+        a_leader |= known && leads;
+    }
+    Heard { all, every_leader, a_leader }
 }

@@ -63,8 +63,8 @@ impl Unsupported {
 /// followers are as safe, but one that is left with no neighbour stays where it is.
 pub fn supported(neighbours: &Neighbours, leaders: &[bool], f: usize, trim: Trim) -> Result<(), Unsupported> {
     let needed = match trim {
-        Trim::PerAxis => 2 * f + 1,
-        Trim::Whole => 4 * f + 1,
+        Trim::PerAxis => f.saturating_mul(2).saturating_add(1),
+        Trim::Whole => f.saturating_mul(4).saturating_add(1),
     };
     let is_follower = |member: &usize| !leaders[*member];
     let members = || (0..neighbours.count()).filter(is_follower);

@@ -4,7 +4,6 @@
 //! never past it. A robot whose target is not finite comes to rest where it is.
 
 mod double_integrator;
-mod ideal;
 mod integrator;
 mod unicycle;
 
@@ -74,7 +73,7 @@ impl Robot {
             return;
         }
         match model {
-            Model::Ideal => ideal::step(self, target, dt),
+            Model::Ideal => self.move_to(target, dt),
             Model::Integrator(integrator) => integrator.step(self, target, dt),
             Model::Unicycle(unicycle) => unicycle.step(self, target, dt),
             Model::DoubleIntegrator(double) => double.step(self, target, dt),
@@ -106,6 +105,13 @@ mod tests {
             Model::Unicycle(Unicycle::default()),
             Model::DoubleIntegrator(DoubleIntegrator::default()),
         ]
+    }
+
+    #[test]
+    fn an_ideal_robot_is_at_its_target_to_the_bit() {
+        let mut robot = Robot::at([1e9, 0.3], 0.0);
+        robot.step(&Model::Ideal, [0.1, 0.7], 0.1);
+        assert_eq!(robot.position, [0.1, 0.7]);
     }
 
     #[test]

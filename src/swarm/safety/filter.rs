@@ -1,6 +1,6 @@
 //! The filter: one pass over the members, each with a cell of its own.
 
-use super::cell::{Cell, HalfPlane, length, shortened};
+use super::cell::{Cell, length, shortened};
 use super::deadlock::Detour;
 use super::limits::{Limits, SafetyError};
 use super::obstacles::Obstacles;
@@ -77,6 +77,8 @@ pub struct Filter {
     /// The highest speed that any member may go at \[m/s\]: a limit that is lowered here is not lowered by the other nodes that move
     /// members, nor for the time before.
     fastest: f64,
+    /// Speed limits of before \[m/s\], each with the time since which another has held \[s\], the last one at the end.
+    earlier: Vec<(f64, f64)>,
     pub(super) radii: Vec<f64>,
     pub(super) largest_radius: f64,
     pub(super) obstacles: Obstacles,
@@ -136,6 +138,7 @@ impl Filter {
             sent: vec![[f64::NAN; 2]; radii.len()].into_iter().collect(),
             sent_before: vec![[f64::NAN; 2]; radii.len()].into_iter().collect(),
             fastest: limits.speed,
+            earlier: Vec::new(),
             limits,
             radii,
             obstacles,
@@ -158,6 +161,11 @@ impl Filter {
         limits.check()?;
         self.fence = limits.geofence.as_deref().map(Obstacles::fence).transpose()?.unwrap_or_default();
         self.fastest = self.fastest.max(limits.speed);
+        // One that was replaced before it held for a tick has let nothing go on.
+        let is_in_use = self.earlier.last().is_none_or(|&(_, since)| since > 0.0);
+        if limits.speed != self.limits.speed && is_in_use {
+            self.earlier.push((self.limits.speed, 0.0));
+        }
         self.limits = limits;
         Ok(())
     }
@@ -168,10 +176,25 @@ impl Filter {
         if self.fastest.is_finite() { self.fastest } else { self.limits.speed }
     }
 
-    /// The longest way of a member in a period \[m\], with that of the time since its pose, in which another limit may have held.
+    /// The longest way of a member in a period \[m\], with that of the time since its pose.
     pub(super) fn longest_step(&self, period: f64, ahead: f64) -> f64 {
-        let before = if ahead > 0.0 { self.fastest() * ahead } else { 0.0 };
-        self.limits.speed * period + before
+        self.limits.speed * period + self.longest_way(ahead)
+    }
+
+    /// The longest way that targets may have gone in the last `time` \[s\], within the limits of then \[m\].
+    fn longest_way(&self, time: f64) -> f64 {
+        let (mut way, mut after, mut speed) = (0.0, 0.0, self.limits.speed);
+        for &(before, since) in self.earlier.iter().rev().take_while(|(_, since)| *since < time) {
+            way += if since > after { speed * (since - after) } else { 0.0 };
+            (after, speed) = (since, before);
+        }
+        way + if time > after { speed * (time - after) } else { 0.0 }
+    }
+
+    /// Whether a member is seen where it may be on the way to its last target \[m\].
+    pub(super) fn is_on_its_way(&self, seen: &Seen, period: f64, member: usize) -> bool {
+        let way = self.longest_way(period + seen.ages[member].max(0.0));
+        distance(seen.present.get(member), self.sent.get(member)) <= way * (1.0 + TOUCHING)
     }
 
     /// The speed that the members themselves keep to \[m/s\]: a lower limit of this node brings their targets nearer.
@@ -234,6 +257,10 @@ impl Filter {
             safe.set(member, target);
             *flags = changed;
         }
+        // Of what is older than all poses nothing is on its way any more.
+        let oldest = seen.ages.iter().copied().fold(0.0, f64::max) + period;
+        self.earlier.iter_mut().for_each(|(_, since)| *since += period);
+        self.earlier.retain(|&(_, since)| since <= oldest + period);
     }
 
     /// Cuts the way from the last target to this one, where the member is taken to be at the last one but seen elsewhere,
@@ -250,7 +277,7 @@ impl Filter {
         let (here, last) = (seen.present.get(member), self.sent.get(member));
         // One that has not come so far, or was carried away, is given its way from where it is seen.
         let age = seen.ages[member].max(0.0);
-        let is_near = distance(here, last) <= self.fastest() * (period + age);
+        let is_near = self.is_on_its_way(seen, period, member);
         let goes_on = is_near && self.ahead(seen, member) > 0.0;
         let is_there = is_near || age > (1.0 - TOUCHING) * period || self.limits.deviation > 0.0;
         let has_arrived =
@@ -258,7 +285,7 @@ impl Filter {
         let is_elsewhere = goes_on || has_arrived;
         if !is_elsewhere || !last.iter().all(|x| x.is_finite()) {
             // Nothing says that it has gone on by a limit that was higher.
-            if self.fastest() > self.limits.speed {
+            if !self.earlier.is_empty() {
                 let most = self.limits.speed * (period + self.ahead(seen, member));
                 let step = shortened(minus(target, here), most);
                 return [here[0] + step[0], here[1] + step[1]];
@@ -272,15 +299,19 @@ impl Filter {
         }
         flags.0 |= Flags::SPEED_LIMITED;
         let place = [last[0] + step[0], last[1] + step[1]];
-        // One that lags behind its targets need not have the cell in which the last one was.
-        let out = minus(place, here);
-        let leaves =
-            |plane: &HalfPlane| dot(plane.normal, out) > plane.offset.max(0.0) + TOUCHING * length(out);
-        if !self.limits.arrives && self.cell.planes.iter().any(leaves) {
-            let step = shortened(minus(target, here), self.limits.speed * period);
-            return [here[0] + step[0], here[1] + step[1]];
+        if self.limits.arrives {
+            return place;
         }
-        place
+        // One that lags behind its targets need not have the cell in which the last one was: as far beyond the limit as leads back
+        // into it.
+        let [out, within] = [place, target].map(|place| minus(place, here));
+        let back = self.cell.planes.iter().map(|plane| {
+            let most = plane.offset.max(0.0) + TOUCHING * length(out);
+            let [out, within] = [out, within].map(|way| dot(plane.normal, way));
+            if out > most { ((out - most) / (out - within)).min(1.0) } else { 0.0 }
+        });
+        let back = back.fold(0.0, f64::max);
+        [0, 1].map(|k| place[k] + back * (target[k] - place[k]))
     }
 
     /// Time for which a member has gone on to its targets since its pose, if they are known \[s\]: by so much farther from

@@ -140,9 +140,8 @@ impl Filter {
             return if distance(last, rest) <= error { last } else { rest };
         }
         // One that was not sent anywhere near, as far as that is limited, or is seen where it is, stops there.
-        let age = seen.ages[member].max(0.0);
         let is_bounded = self.limits.speed.is_finite() || self.limits.acceleration.is_finite();
-        let is_on_its_way = is_bounded && distance(here, last) <= self.fastest() * (period + age);
+        let is_on_its_way = is_bounded && self.is_on_its_way(seen, period, member);
         let from = if is_on_its_way && self.is_inexact(seen, period, member) { last } else { here };
         // No faster than it was sent: one that is pushed, or carried away, has no way to brake.
         let before = self.sent_before.get(member);

@@ -196,10 +196,13 @@ impl Member {
     /// Whether a pose that is good in itself is believed after those before it.
     fn weigh(&mut self, pose: &Pose, now: f64, limits: &WatchLimits) -> Result<(), Rejection> {
         let Some(last) = self.accepted else { return Ok(()) };
+        let (far, allowed) = limits.jump(&last, pose);
+        if pose.stamp == last.stamp && far > allowed {
+            return Err(Rejection::TwoAtOnce { distance: far });
+        }
         if pose.stamp <= last.stamp {
             return Err(Rejection::NotNewer { behind: last.stamp - pose.stamp });
         }
-        let (far, allowed) = limits.jump(&last, pose);
         let stopped = limits.health(self.age(now)) == Health::Stopped;
         if !stopped && far <= allowed {
             return Ok(());

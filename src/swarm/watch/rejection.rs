@@ -57,6 +57,15 @@ pub enum Rejection {
         /// How much older than the newest one it is \[s\]; 0 for a copy.
         behind: f64,
     },
+    /// It is of the same time as the newest one, and of another place.
+    #[error(
+        "a pose is of the same time as another and lies {} m from it: two publish the poses of this robot; end one of them",
+        metres(.distance)
+    )]
+    TwoAtOnce {
+        /// Distance from the other \[m\].
+        distance: f64,
+    },
     /// It implies a speed that no robot has.
     #[error(
         "a pose lies {} m from the last one, at most {allowed:.3} m is allowed in the time between: \
@@ -114,6 +123,7 @@ impl Rejection {
             Rejection::OutOfRange { .. } => Some("out of range"),
             Rejection::FromTheFuture { .. } => Some("from the future"),
             Rejection::TooOld { .. } => Some("too old"),
+            Rejection::TwoAtOnce { .. } => Some("two at once"),
             Rejection::Jump { .. } => Some("jump"),
             Rejection::Contradicted { .. } => Some("contradicted by ranges"),
             Rejection::Unconfirmed { .. } => Some("not confirmed by ranges"),
@@ -140,7 +150,7 @@ pub struct Counts {
     pub from_the_future: u64,
     /// Rejections as [`Rejection::TooOld`].
     pub too_old: u64,
-    /// Rejections as [`Rejection::NotNewer`].
+    /// Rejections as [`Rejection::NotNewer`] and [`Rejection::TwoAtOnce`].
     pub not_newer: u64,
     /// Rejections as [`Rejection::Jump`].
     pub jumps: u64,
@@ -153,6 +163,11 @@ pub struct Counts {
 }
 
 impl Counts {
+    /// Poses that came.
+    pub fn all(&self) -> u64 {
+        self.accepted + self.rejected()
+    }
+
     /// Poses that were not used, for whatever reason.
     pub fn rejected(&self) -> u64 {
         self.not_finite
@@ -174,7 +189,7 @@ impl Counts {
             Rejection::OutOfRange { .. } => &mut self.out_of_range,
             Rejection::FromTheFuture { .. } => &mut self.from_the_future,
             Rejection::TooOld { .. } => &mut self.too_old,
-            Rejection::NotNewer { .. } => &mut self.not_newer,
+            Rejection::NotNewer { .. } | Rejection::TwoAtOnce { .. } => &mut self.not_newer,
             Rejection::Jump { .. } => &mut self.jumps,
             Rejection::Contradicted { .. } => &mut self.contradicted,
             Rejection::Unconfirmed { .. } => &mut self.unconfirmed,
