@@ -9,7 +9,8 @@ use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{
-    AllocationStrategy, BackpressureStrategy, MessagingPattern, Service as _, ServiceName, ipc,
+    AllocationStrategy, BackpressureStrategy, CallbackProgression, MessagingPattern, PortName, Service as _,
+    ServiceName, ipc,
 };
 use iceoryx2::sample::Sample;
 use iceoryx2::sample_mut::SampleMut;
@@ -241,7 +242,9 @@ pub struct Writer<T: Payload> {
     notifier: Notifier<ipc::Service>,
     factory: Slices<T>,
     sequence: u64,
-    /// Other writers at the last look \[1\].
+    /// Name of the member that it writes for; empty for all of them.
+    part: PortName,
+    /// Other writers for the same members at the last look \[1\].
     others: usize,
 }
 
@@ -257,11 +260,26 @@ impl<T: Payload> Writer<T> {
         capacity: &Capacity,
         most: usize,
     ) -> Result<Self, ShmError> {
+        Self::open_for(peer, space, leaf, capacity, most, None)
+    }
+
+    /// As [`Writer::open`]; of several that share a service, each for one member alone.
+    pub(super) fn open_for(
+        peer: &Peer,
+        space: &str,
+        leaf: &str,
+        capacity: &Capacity,
+        most: usize,
+        member: Option<usize>,
+    ) -> Result<Self, ShmError> {
         let opened = Opened::<T>::new(peer, service_name(space, leaf)?, capacity)?;
+        let part = member.map_or_else(String::new, |member| member.to_string());
+        let part = PortName::new(&part).unwrap_or(PortName::new_empty());
         let slices = slices_that_fit::<T>(capacity, most);
         let publisher = opened
             .slices
             .publisher_builder()
+            .name(&part)
             .initial_max_slice_len(most.max(1))
             .allocation_strategy(AllocationStrategy::Static)
             .max_loaned_samples(1)
@@ -280,7 +298,7 @@ impl<T: Payload> Writer<T> {
         let notifier = opened.event.notifier_builder().create();
         let notifier = notifier.map_err(|error| opened.port("writer", error, capacity.writers))?;
         let Opened { name: service, slices: factory, .. } = opened;
-        Ok(Self { service, publisher, notifier, factory, sequence: 0, others: 0 })
+        Ok(Self { service, publisher, notifier, factory, sequence: 0, part, others: 0 })
     }
 
     /// Borrows a slice of `count` elements, fills it in place with `element`, hands it to all readers and wakes them.
@@ -328,7 +346,14 @@ impl<T: Payload> Writer<T> {
     /// Warns when other processes have come that write the same, with `what` that does.
     pub(super) fn warn_of_others(&mut self, what: &str) {
         use iceoryx2::prelude::PortFactory as _;
-        let others = self.factory.dynamic_config().number_of_publishers().saturating_sub(1);
+        let (own, is_all) = (self.publisher.id(), |part: &PortName| part.as_str().is_empty());
+        let mut others = 0;
+        self.factory.dynamic_config().list_publishers(|other| {
+            let part = other.publisher_name;
+            let is_same = part == self.part || is_all(&part) || is_all(&self.part);
+            others += usize::from(is_same && other.publisher_id != own);
+            CallbackProgression::Continue
+        });
         if others > self.others {
             tracing::warn!(
                 "{}: {}: {what}; end one, or keep them apart by {}",

@@ -48,11 +48,12 @@ impl Controller {
             members.iter().for_each(|&member| all[member] = true);
             all
         };
+        let alone = part.mine.first().copied().filter(|_| part.mine.len() < count);
         Ok(Self {
             poses: Reader::open(peer, space, POSES, &Capacity::SWARM)?,
             ranges: has_ranges.then(|| Reader::open(peer, space, RANGES, &Capacity::SWARM)).transpose()?,
             leaders: Reader::open(peer, space, LEADERS, &Capacity::SWARM)?,
-            targets: Writer::open(peer, space, TARGETS, &Capacity::SWARM, part.mine.len())?,
+            targets: Writer::open_for(peer, space, TARGETS, &Capacity::SWARM, part.mine.len(), alone)?,
             hears: among(&part.heard),
             serves: among(&part.mine),
             tick: 0,
@@ -66,11 +67,9 @@ impl Controller {
         self.poses.service()
     }
 
-    /// Warns when another node of the same swarm comes; nodes of single robots are several.
+    /// Warns when another node comes that moves the same robots.
     pub(crate) fn warn_of_others(&mut self) {
-        if self.serves.iter().all(|serves| *serves) {
-            self.targets.warn_of_others("another node moves the same robots");
-        }
+        self.targets.warn_of_others("another node moves the same robots");
     }
 
     /// The bell that rings when poses or places of leaders arrive.
@@ -84,46 +83,48 @@ impl ControllerEnd for Controller {
     type Error = ShmError;
 
     fn receive(&mut self, now: f64, take: &mut dyn FnMut(Received)) {
-        self.poses.still();
-        self.leaders.still();
-        let count = self.hears.len();
-        if let Some(ranges) = &self.ranges {
+        let Self { poses, ranges, leaders, hears, serves, refused, complaints, .. } = self;
+        poses.still();
+        leaders.still();
+        let count = hears.len();
+        let mut refuse = |service: &str, what: &str, member: usize| {
+            *refused += 1;
+            let text = format_args!(
+                "{service}: {what} is of robot {member}, and the swarm has {count}, from 0: it is of another swarm file of this name"
+            );
+            // One line for all of them.
+            complaints.warn("no such robot", count, system_time(), &text);
+        };
+        if let Some(ranges) = ranges {
             ranges.still();
             for slice in std::iter::from_fn(|| ranges.take()).take(MOST_AT_ONCE) {
                 for wire in slice.iter() {
                     let [observer, of] = [wire.observer, wire.of].map(|member| member as usize);
                     if observer.max(of) >= count {
-                        self.refused += 1;
-                    } else if self.hears[observer] && self.hears[of] {
+                        refuse(ranges.service(), "a range", observer.max(of));
+                    } else if hears[observer] && hears[of] {
                         let stamp = if wire.stamp == 0.0 { now } else { wire.stamp };
                         take(Received::Range(Range { observer, of, distance: wire.distance, stamp }));
                     }
                 }
             }
         }
-        for slice in std::iter::from_fn(|| self.poses.take()).take(MOST_AT_ONCE) {
+        for slice in std::iter::from_fn(|| poses.take()).take(MOST_AT_ONCE) {
             for wire in slice.iter() {
                 let member = wire.member as usize;
                 if member >= count {
-                    self.refused += 1;
-                    let text = format_args!(
-                        "{}: a pose is of robot {member}, and the swarm has {count}, from 0: it is of another swarm \
-                         file of this name",
-                        self.poses.service()
-                    );
-                    // One line for all of them.
-                    self.complaints.warn("no such robot", count, system_time(), &text);
-                } else if self.hears[member] {
+                    refuse(poses.service(), "a pose", member);
+                } else if hears[member] {
                     take(Received::Pose(member, pose(wire, now)));
                 }
             }
         }
-        for slice in std::iter::from_fn(|| self.leaders.take()).take(MOST_AT_ONCE) {
+        for slice in std::iter::from_fn(|| leaders.take()).take(MOST_AT_ONCE) {
             for leader in slice.iter() {
                 let member = leader.member as usize;
                 if member >= count {
-                    self.refused += 1;
-                } else if self.serves[member] {
+                    refuse(leaders.service(), "the place of a leader", member);
+                } else if serves[member] {
                     take(Received::Leader(member, leader.position));
                 }
             }

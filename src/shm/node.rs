@@ -6,6 +6,7 @@
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
+use super::channel::MOST_AT_ONCE;
 use super::link::Controller;
 use super::payload::{Command, Formation, Member};
 use super::{Capacity, Domain, Peer, Reader, ShmError, Writer, folders, room_for_swarm, wait};
@@ -45,7 +46,6 @@ pub struct FormationNode {
     members: Writer<Member>,
     complaints: Complaints,
     silence: Silence,
-    missed: u64,
     unsent: u64,
     elapsed: f64,
     // Dropped after all that was made from it.
@@ -73,7 +73,6 @@ impl FormationNode {
             members: Writer::open(&peer, space, MEMBERS, capacity, control.formation().count())?,
             complaints: Complaints::default(),
             silence: Silence::default(),
-            missed: 0,
             unsent: 0,
             elapsed: 0.0,
             part,
@@ -102,10 +101,7 @@ impl FormationNode {
             loop {
                 match self.pace.due() {
                     Due::In(rest) => return Duration::from_secs_f64(rest),
-                    Due::Now { missed } => {
-                        self.missed += missed;
-                        self.tick();
-                    }
+                    Due::Now { .. } => self.tick(),
                 }
             }
         })
@@ -139,7 +135,7 @@ impl FormationNode {
 
     fn obey(&mut self) {
         self.commands.still();
-        while let Some(slice) = self.commands.take() {
+        for slice in std::iter::from_fn(|| self.commands.take()).take(MOST_AT_ONCE) {
             for command in slice.iter() {
                 match command.kind {
                     Command::EMERGENCY_STOP if self.orders.may_stop() => self.control.emergency_stop(),
@@ -147,7 +143,11 @@ impl FormationNode {
                         self.control.resume();
                     }
                     other => {
-                        tracing::warn!("{}: command {other} is none, or not allowed", self.commands.service())
+                        let text = format_args!(
+                            "{}: command {other} is none, or not allowed",
+                            self.commands.service()
+                        );
+                        self.complaints.warn("command", 0, system_time(), &text);
                     }
                 }
             }

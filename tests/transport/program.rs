@@ -77,14 +77,14 @@ fn a_member_s_own_node_hears_its_neighbours_alone_and_moves_nobody_else() {
 
 /// The program with the square in a domain of shared memory.
 fn start(domain: &str, subcommand: &str) -> Running {
-    start_with(domain, subcommand, Stdio::inherit())
+    start_with(domain, &[subcommand], Stdio::inherit())
 }
 
 #[test]
 fn both_say_what_they_serve_as_over_ros_2() {
     let name = domain_name();
     for (subcommand, expected) in [("robots", "25 simulated robots"), ("node", "25 robots at 100.0 Hz")] {
-        let mut running = start_with(&name, subcommand, Stdio::piped());
+        let mut running = start_with(&name, &[subcommand], Stdio::piped());
         let mut lines = BufReader::new(running.0.stderr.take().expect("piped")).lines();
         let line = lines.find(|line| line.as_ref().is_ok_and(|line| line.contains("`square`: ")));
         let line = line.expect("a line").expect("text");
@@ -93,9 +93,9 @@ fn both_say_what_they_serve_as_over_ros_2() {
     }
 }
 
-fn start_with(domain: &str, subcommand: &str, log: Stdio) -> Running {
+fn start_with(domain: &str, arguments: &[&str], log: Stdio) -> Running {
     let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
-    command.args([subcommand, "square", "--transport", "shm"]);
+    command.args(arguments).args(["square", "--transport", "shm"]);
     OVERRIDES.iter().for_each(|one| {
         command.args(["--set", one]);
     });
@@ -107,7 +107,7 @@ fn start_with(domain: &str, subcommand: &str, log: Stdio) -> Running {
 #[test]
 fn a_second_node_and_robots_of_another_number_are_said() {
     let name = domain_name();
-    let mut running = start_with(&name, "node", Stdio::piped());
+    let mut running = start_with(&name, &["node"], Stdio::piped());
     let lines = BufReader::new(running.0.stderr.take().expect("piped")).lines();
     let mut lines = lines.map(|line| line.expect("text"));
     let mut line = |words: &str| lines.find(|line| line.contains(words)).expect("a line");
@@ -120,6 +120,26 @@ fn a_second_node_and_robots_of_another_number_are_said() {
     let second = start(&name, "node");
     line("another node moves the same robots");
     drop(second);
+    assert_eq!(running.terminate(), Some(0));
+}
+
+#[test]
+fn a_second_node_of_the_same_robot_is_said_and_one_of_another_is_not() {
+    let name = domain_name();
+    let member = |robot| ["node", "--set", "control.sweeps=1", "--member", robot];
+    let mut running = start_with(&name, &member("robot_7"), Stdio::piped());
+    let lines = BufReader::new(running.0.stderr.take().expect("piped")).lines();
+    let mut lines = lines.map(|line| line.expect("text"));
+    let mut line = |words: &str| lines.find(|line| line.contains(words)).expect("a line");
+    line("robot_7");
+    let node = |arguments: &[&str]| start_with(&name, arguments, Stdio::null());
+    let _other = node(&member("robot_8"));
+    let _same = node(&member("robot_7"));
+    let said = line("another node moves the same robots");
+    assert!(said.contains("1 other writer:"), "{said}");
+    let _all = node(&["node"]);
+    let said = line("another node moves the same robots");
+    assert!(said.contains("2 other writers:"), "{said}");
     assert_eq!(running.terminate(), Some(0));
 }
 
