@@ -199,7 +199,11 @@ pub(crate) fn check_namespace(namespace: &str) -> Result<(), NameError> {
     if namespace == "/" { Ok(()) } else { check_full_name("namespace", namespace) }
 }
 
-fn check_full_name(what: &'static str, name: &str) -> Result<(), NameError> {
+/// Refuses what is no fully qualified name.
+///
+/// # Errors
+/// A name that is relative, too long, or has a token that is not allowed.
+pub(crate) fn check_full_name(what: &'static str, name: &str) -> Result<(), NameError> {
     let refuse = |reason, help| error(what, name, reason, help);
     if name.len() > LONGEST_NAME {
         let reason = format!("has {} characters, more than {LONGEST_NAME}", name.len());
@@ -239,4 +243,20 @@ pub(crate) fn check_token(token: &str) -> Result<(), String> {
         return Err(format!("`{token}` contains two underscores in a row"));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_fully_qualified_names_pass() {
+        for good in ["/a", "/robot_1/pose", "/A/b2/c_d"] {
+            assert_eq!(check_full_name("topic name", good), Ok(()), "{good}");
+        }
+        for bad in ["", "/", "a", "/a/", "//a", "/a//b", "/1a", "/a b", "/a-b", "~/a", "/{a}", "/a__b", "/é"]
+        {
+            assert!(check_full_name("topic name", bad).is_err(), "{bad}");
+        }
+    }
 }

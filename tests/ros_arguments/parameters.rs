@@ -8,7 +8,7 @@ use crate::{parse, refusal, ros};
 
 #[test]
 fn values_have_the_types_that_rcl_gives_them() {
-    let text = |text: &str| Value::Text(text.into());
+    let text = |text: &str| Value::String(text.into());
     for (yaml, value) in [
         ("true", Value::Bool(true)),
         ("Yes", Value::Bool(true)),
@@ -41,7 +41,7 @@ fn values_have_the_types_that_rcl_gives_them() {
         ("[true, no]", Value::Bools(vec![true, false])),
         ("[1, 2]", Value::Integers(vec![1, 2])),
         ("[1.0, 2.5]", Value::Doubles(vec![1.0, 2.5])),
-        ("[a, 'b c']", Value::Texts(vec!["a".into(), "b c".into()])),
+        ("[a, 'b c']", Value::Strings(vec!["a".into(), "b c".into()])),
     ] {
         let arguments = ["--ros-args".into(), "-p".into(), format!("name:={yaml}")];
         let (_, ros) = parse(&arguments).unwrap_or_else(|error| panic!("{yaml}: {error}"));
@@ -69,7 +69,7 @@ pub fn files(texts: &[&str]) -> (tempfile::TempDir, Vec<PathBuf>) {
 fn given(ros: &RosArguments, node: &str) -> Vec<String> {
     let show = |value: &Value| match value {
         Value::Integer(number) => number.to_string(),
-        Value::Text(text) => text.clone(),
+        Value::String(text) => text.clone(),
         other => format!("{other:?}"),
     };
     ros.parameters_for(node).iter().map(|p| format!("{}={}", p.name, show(&p.value))).collect()

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::remap::split_node;
-use super::{RosArgumentError, Value};
+use super::{RosArgumentError, Value, value};
 use crate::messages::names::check_token;
 
 /// Where a value was given.
@@ -117,7 +117,7 @@ pub(super) fn parse(flag: &str, rule: &str) -> Result<Assignment, RosArgumentErr
         None => NodePattern::every_node(),
     };
     check_parameter_name(name).map_err(|reason| refuse(reason, SHAPE))?;
-    let value = Value::parse(value).map_err(|(reason, help)| refuse(reason, help))?;
+    let value = value::parse(value).map_err(|(reason, help)| refuse(reason, help))?;
     Ok(Assignment::new(node, name.into(), value, Origin::CommandLine(rule.into())))
 }
 

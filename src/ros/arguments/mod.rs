@@ -29,7 +29,7 @@ pub mod logging;
 mod parameter_file;
 mod remap;
 mod security;
-pub mod value;
+mod value;
 mod yaml;
 
 use std::ffi::OsStr;
@@ -37,12 +37,12 @@ use std::path::PathBuf;
 
 pub use crate::messages::names::{NameError, Names};
 pub use crate::messages::remap::RemapRule;
+pub use crate::ros::edge::parameters::Value;
 pub use assignment::{Assignment, NodePattern, Origin, Parameter};
 pub use environment::{DiscoveryRange, Environment};
 pub use error::RosArgumentError;
 pub use logging::{Logging, Severity};
 pub use security::{Security, SecurityRequest};
-pub use value::Value;
 
 /// The ROS arguments of a process.
 #[derive(Clone, Debug, Default, PartialEq)]

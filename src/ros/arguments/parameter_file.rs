@@ -14,7 +14,7 @@
 use std::path::Path;
 
 use super::yaml::{self, Entry, Node, YamlError};
-use super::{NodePattern, RosArgumentError, Value};
+use super::{NodePattern, RosArgumentError, Value, value};
 
 const PARAMETERS: &str = "ros__parameters";
 const SHAPE: &str = "write NODE, then ros__parameters below it, then NAME: VALUE lines";
@@ -80,7 +80,7 @@ fn read_parameters(
             read_parameters(pattern, &name, children, parameters)?;
             continue;
         }
-        let value = Value::from_node(node)
+        let value = value::from_node(node)
             .map_err(|(reason, help)| error(*line, format!("parameter `{name}` {reason}"), help))?;
         parameters.push(FileEntry { node: pattern.clone(), name, value, line: *line });
     }

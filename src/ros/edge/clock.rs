@@ -11,6 +11,9 @@ pub struct Clock {
     simulated: Option<Simulated>,
 }
 
+/// Readings that are taken at once: a flood must not hold a loop.
+const MOST_AT_ONCE: usize = 1024;
+
 /// Silence of a simulator that is worth a word.
 const PATIENCE: Duration = Duration::from_secs(3);
 
@@ -70,7 +73,7 @@ impl Clock {
     /// Hears what came since it was last read, and returns the time, as [`Clock::now`].
     pub fn read(&mut self) -> Option<f64> {
         if let Some(Simulated { since, subscription, reading }) = &mut self.simulated {
-            while let Some((message, _)) = subscription.take() {
+            for (message, _) in std::iter::from_fn(|| subscription.take()).take(MOST_AT_ONCE) {
                 *since = Instant::now();
                 reading.receive(message.clock.seconds());
             }

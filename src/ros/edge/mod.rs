@@ -67,10 +67,8 @@ pub enum EdgeError {
          they allow ros_discovery_info"
     )]
     Enclave { domain: u16, place: String, reason: String },
-    #[error("{name:?} is no {kind} name: {reason}")]
-    Name { kind: &'static str, name: String, reason: &'static str },
     #[error("{0}")]
-    Resolution(#[from] NameError),
+    Name(#[from] NameError),
     #[error("no endpoint on {topic}: {reason}")]
     Endpoint { topic: String, reason: String },
     #[error(

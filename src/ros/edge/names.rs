@@ -1,30 +1,4 @@
-//! Names as ROS 2 writes them, and what becomes of them on the wire.
-
-use super::EdgeError;
-
-/// Checks a fully qualified topic or service name: `/a/b`, tokens of letters, digits and underscores that
-/// do not begin with a digit.
-pub fn check(kind: &'static str, name: &str) -> Result<(), EdgeError> {
-    let refuse = |reason| Err(EdgeError::Name { kind, name: name.to_owned(), reason });
-    let Some(tokens) = name.strip_prefix('/') else {
-        return refuse("it must be fully qualified, beginning with a slash");
-    };
-    for token in tokens.split('/') {
-        if token.is_empty() {
-            return refuse("an empty token (a doubled or trailing slash)");
-        }
-        if token.starts_with(|c: char| c.is_ascii_digit()) {
-            return refuse("a token begins with a digit");
-        }
-        if !token.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
-            return refuse("only letters, digits, underscores and slashes are allowed");
-        }
-        if token.contains("__") {
-            return refuse("doubled underscores are reserved");
-        }
-    }
-    Ok(())
-}
+//! What becomes of names on the wire.
 
 /// DDS topic of a ROS 2 topic.
 pub(super) fn dds_topic(name: &str) -> String {
@@ -49,17 +23,6 @@ pub(super) fn dds_service_types(package: &str, name: &str) -> [String; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn only_fully_qualified_names_pass() {
-        for good in ["/a", "/robot_1/pose", "/A/b2/c_d"] {
-            assert_eq!(check("topic", good), Ok(()), "{good}");
-        }
-        for bad in ["", "/", "a", "/a/", "//a", "/a//b", "/1a", "/a b", "/a-b", "~/a", "/{a}", "/a__b", "/é"]
-        {
-            assert!(check("topic", bad).is_err(), "{bad}");
-        }
-    }
 
     #[test]
     fn wire_names_are_those_of_the_ros_2_design() {

@@ -22,7 +22,7 @@ use super::places::Places;
 use super::pulse::{self, Pulse};
 use super::whole::WholeReplies;
 use super::{EdgeError, Publisher, Quality, Service, Subscription, farewell, names};
-use crate::messages::names::Names;
+use crate::messages::names::{Names, check_full_name};
 use crate::messages::{Message, ServiceType};
 
 /// Where to take part.
@@ -152,11 +152,9 @@ impl Edge {
     /// letters, digits and underscores.
     pub fn node(&self, namespace: &str, name: &str) -> Result<Node, EdgeError> {
         let qualified = if namespace == "/" { format!("/{name}") } else { format!("{namespace}/{name}") };
-        names::check("node", &qualified)?;
-        let reserved =
-            |_| EdgeError::Name { kind: "node", name: qualified.clone(), reason: "not a node name" };
-        let parsed = NodeName::new(namespace, name).map_err(reserved)?;
         let names = Names::new(name, namespace, &[])?;
+        let refused = |error| EdgeError::Endpoint { topic: qualified.clone(), reason: format!("{error:?}") };
+        let parsed = NodeName::new(namespace, name).map_err(refused)?;
         self.shared.graph.add_node(parsed);
         Ok(Node { shared: self.shared.clone(), name: qualified, names, commands: Mutex::default() })
     }
@@ -382,7 +380,7 @@ impl Node {
     /// # Errors
     /// A bad name, a topic that is kept for commands, or an endpoint that RustDDS refuses (the same topic with another type).
     pub fn publisher<M: Message>(&self, topic: &str, quality: Quality) -> Result<Publisher<M>, EdgeError> {
-        names::check("topic", topic)?;
+        check_full_name("topic name", topic)?;
         if self.commands.lock().unwrap_or_else(PoisonError::into_inner).contains(topic) {
             return Err(EdgeError::OwnCommands { topic: topic.to_owned(), kind: M::NAME });
         }
@@ -402,7 +400,7 @@ impl Node {
         topic: &str,
         quality: Quality,
     ) -> Result<Subscription<M>, EdgeError> {
-        names::check("topic", topic)?;
+        check_full_name("topic name", topic)?;
         Subscription::open(&self.shared, &self.name, topic, quality)
     }
 
@@ -411,7 +409,7 @@ impl Node {
     /// # Errors
     /// As [`Node::publisher`].
     pub fn service<S: ServiceType>(&self, name: &str) -> Result<Service<S>, EdgeError> {
-        names::check("service", name)?;
+        check_full_name("service name", name)?;
         let [requests, replies] = names::dds_service(name);
         let [request, response] = names::dds_service_types(S::PACKAGE, S::NAME);
         // Replies first: a client that sees the requests' reader may ask at once.

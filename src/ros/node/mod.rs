@@ -44,8 +44,8 @@ use crate::messages::std_srvs;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::RawService;
-use crate::swarm::control::Control;
 use crate::swarm::control::scope::NodeScope;
+use crate::swarm::control::{Control, Mode};
 use crate::swarm::pace::{Pace, system_time};
 use crate::swarm::plan::cautions;
 use crate::swarm::transport::complaints::Complaints;
@@ -90,6 +90,8 @@ pub struct FormationNode {
     recorder: Option<MessageRecorder>,
     diagnostics: Publisher<DiagnosticArray>,
     statistics: Statistics,
+    /// Poses that had come when the watchdog last asked.
+    came: u64,
     complaints: Complaints,
     /// Whether the present silence of the clock was reported.
     has_missed_clock: bool,
@@ -154,6 +156,7 @@ impl FormationNode {
             recorder: None,
             diagnostics: node.publisher(&names.topic("/diagnostics")?, Quality::reliable(5))?,
             statistics: Statistics::default(),
+            came: 0,
             complaints: Complaints::default(),
             has_missed_clock: false,
             was_active: false,
@@ -256,9 +259,10 @@ impl FormationNode {
                 }
                 None => self.attend(),
             }
+            let hears_any = self.hears_any();
             if let Some(pulse) = &self.pulse {
                 match &self.endpoints {
-                    Some(endpoints) => pulse.note_peers(self.hears_any(), || endpoints.link.left()),
+                    Some(endpoints) => pulse.note_peers(hears_any, || endpoints.link.left()),
                     None => pulse.listens_to_none(),
                 }
             }
@@ -300,8 +304,13 @@ impl FormationNode {
         self.origin.reached_at()
     }
 
-    fn hears_any(&self) -> bool {
-        self.origin.part.heard.iter().any(|&m| self.control.health(m).is_usable())
+    /// Whether a pose is of use, or any came since this was last asked: one that is not believed is heard as well.
+    fn hears_any(&mut self) -> bool {
+        let heard = || self.origin.part.heard.iter();
+        let came: u64 = heard().map(|&m| self.control.watch().counts(m).all()).sum();
+        let is_any = came != self.came || heard().any(|&m| self.control.health(m).is_usable());
+        self.came = came;
+        is_any
     }
 
     /// Where the recorder is: with the topics of a configured node.
@@ -434,9 +443,12 @@ impl FormationNode {
             is_finalized: self.lifecycle.state() == State::Finalized,
             events: Vec::new(),
         };
-        if self.stop_requests.as_ref().is_some_and(|requests| requests.take_last().is_some()) {
+        // A peer that goes on asking asks for what is so already.
+        if self.stop_requests.as_ref().is_some_and(|requests| requests.take_last().is_some())
+            && commanded.control.mode() != Mode::EmergencyStopped
+            && commanded.perform(&NodeCommand::EmergencyStop).is_ok()
+        {
             tracing::warn!("emergency stop by topic");
-            let _ = commanded.perform(&NodeCommand::EmergencyStop);
         }
         let outcome = |answer: Answer| {
             let (success, message) = (answer.is_ok(), answer.unwrap_or_else(|refused| refused));

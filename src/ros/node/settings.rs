@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::NodeError;
 use crate::messages::names::Names;
-use crate::ros::arguments::{Parameter, RosArguments, Value as Given};
+use crate::ros::arguments::{Parameter, RosArguments};
 use crate::ros::edge::parameters::{Change, Declaration, Store, Value};
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::RawNode;
@@ -90,7 +90,7 @@ pub(super) fn declare(
             .range(0.0..=2.0)
             .describe("part of the way to its target that a follower goes in a sweep [1]"),
         Declaration::new("sweeps", control.sweeps() as i64)
-            .integer_range(1..=most_sweeps(control, part), 0)
+            .integer_range(1..=most_sweeps(control, part))
             .describe("applications of the rule in a period [1]"),
         Declaration::new("autostart", true)
             .read_only()
@@ -147,7 +147,7 @@ pub(in crate::ros) fn store(declarations: Vec<Declaration>, given: &[Parameter])
     let names: Vec<String> = declarations.iter().map(|one| one.name().to_owned()).collect();
     for declaration in declarations {
         let start = given.iter().rev().find(|one| one.name == declaration.name());
-        store.declare(declaration, start.map(|one| value(&one.value)))?;
+        store.declare(declaration, start.map(|one| one.value.clone()))?;
     }
     for one in given.iter().filter(|one| !names.contains(&one.name)) {
         tracing::warn!("parameter `{}` is not one of this node's: {}", one.name, names.join(", "));
@@ -209,18 +209,5 @@ impl Settings {
         {
             tracing::warn!("{error}");
         }
-    }
-}
-
-fn value(given: &Given) -> Value {
-    match given.clone() {
-        Given::Bool(value) => Value::Bool(value),
-        Given::Integer(value) => Value::Integer(value),
-        Given::Double(value) => Value::Double(value),
-        Given::Text(value) => Value::String(value),
-        Given::Bools(values) => Value::Bools(values),
-        Given::Integers(values) => Value::Integers(values),
-        Given::Doubles(values) => Value::Doubles(values),
-        Given::Texts(values) => Value::Strings(values),
     }
 }

@@ -1,5 +1,6 @@
 //! Declarations of parameters: type, range, conditions. Pure.
 
+use std::fmt::Debug;
 use std::ops::RangeInclusive;
 
 use super::Value;
@@ -9,7 +10,7 @@ use crate::messages::said;
 /// A validator: `Err` with the reason refuses a value.
 pub type Check = Box<dyn Fn(&str, &Value) -> Result<(), String> + Send>;
 
-/// Values that a number may take, both ends included; a step of 0 allows all between.
+/// Values that a number may take, both ends included; the step of 0 allows all between.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Range {
     Integer(IntegerRange),
@@ -60,20 +61,11 @@ impl Declaration {
         self
     }
 
-    /// Smallest and largest whole number, and the step between values (0: any).
+    /// Smallest and largest whole number.
     #[must_use]
-    pub fn integer_range(mut self, range: RangeInclusive<i64>, step: u64) -> Self {
+    pub fn integer_range(mut self, range: RangeInclusive<i64>) -> Self {
         let (from_value, to_value) = range.into_inner();
-        self.range = Some(Range::Integer(IntegerRange { from_value, to_value, step }));
-        self
-    }
-
-    /// Step between numbers, counted from the smallest; after [`Declaration::range`].
-    #[must_use]
-    pub fn step(mut self, step: f64) -> Self {
-        if let Some(Range::Double(range)) = &mut self.range {
-            range.step = step;
-        }
+        self.range = Some(Range::Integer(IntegerRange { from_value, to_value, step: 0 }));
         self
     }
 
@@ -129,9 +121,11 @@ impl Declaration {
             return Err(Refusal::NotANumber { name: name() });
         }
         match (self.range, &value) {
-            (Some(Range::Double(range)), Value::Double(number)) => within(&self.name, range, *number)?,
-            (Some(Range::Integer(range)), Value::Integer(number)) => {
-                within_whole(&self.name, range, *number)?
+            (Some(Range::Double(FloatingPointRange { from_value, to_value, .. })), Value::Double(number)) => {
+                self.within(from_value, to_value, *number)?;
+            }
+            (Some(Range::Integer(IntegerRange { from_value, to_value, .. })), Value::Integer(number)) => {
+                self.within(from_value, to_value, *number)?;
             }
             _ => {}
         }
@@ -140,30 +134,14 @@ impl Declaration {
         }
         Ok(value)
     }
-}
 
-fn within(name: &str, range: FloatingPointRange, value: f64) -> Result<(), Refusal> {
-    let FloatingPointRange { from_value: from, to_value: to, step } = range;
-    let steps = (value - from) / step;
-    // Steps are decimal fractions to people and binary ones here.
-    let on_step = step == 0.0 || value == to || (steps - steps.round()).abs() <= 1e-6;
-    if (from..=to).contains(&value) && on_step {
-        return Ok(());
+    fn within<T: PartialOrd + Debug>(&self, from: T, to: T, value: T) -> Result<(), Refusal> {
+        if (&from..=&to).contains(&&value) {
+            return Ok(());
+        }
+        let (value, allowed) = (format!("{value:?}"), format!("{from:?} to {to:?}"));
+        Err(Refusal::Range { name: self.name.clone(), value, allowed })
     }
-    let steps = if step == 0.0 { String::new() } else { format!(" in steps of {step:?}") };
-    let allowed = format!("{from:?} to {to:?}{steps}");
-    Err(Refusal::Range { name: name.into(), value: format!("{value:?}"), allowed })
-}
-
-fn within_whole(name: &str, range: IntegerRange, value: i64) -> Result<(), Refusal> {
-    let IntegerRange { from_value: from, to_value: to, step } = range;
-    let on_step = step == 0 || value == to || value.abs_diff(from).is_multiple_of(step);
-    if (from..=to).contains(&value) && on_step {
-        return Ok(());
-    }
-    let steps = if step == 0 { String::new() } else { format!(" in steps of {step}") };
-    let allowed = format!("{from} to {to}{steps}");
-    Err(Refusal::Range { name: name.into(), value: value.to_string(), allowed })
 }
 
 /// Why a parameter was not set or declared.

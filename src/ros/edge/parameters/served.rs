@@ -1,6 +1,6 @@
 //! The store behind its services.
 
-use super::{Change, Declaration, Refusal, Store, Value};
+use super::{Change, Refusal, Store, Value};
 use crate::messages::builtin_interfaces::Time;
 use crate::messages::{rcl_interfaces as msgs, said};
 use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Service};
@@ -95,11 +95,6 @@ impl Parameters {
     pub fn open(node: &Node, store: Store, is_served: bool) -> Result<Self, EdgeError> {
         let services = is_served.then(|| Services::new(node)).transpose()?;
         Ok(Self { store, node: node.name().into(), services, announced: false })
-    }
-
-    /// Declares one more: see [`Store::declare`].
-    pub fn declare(&mut self, declaration: Declaration, start: Option<Value>) -> Result<(), Refusal> {
-        self.store.declare(declaration, start)
     }
 
     pub fn get(&self, name: &str) -> Option<&Value> {

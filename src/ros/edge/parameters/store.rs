@@ -137,9 +137,9 @@ mod tests {
         let mut store = Store::default();
         let declarations = [
             Declaration::new("rate", 50.0).describe("ticks per second [Hz]").range(1.0..=500.0),
-            Declaration::new("gains.p", 1.0).range(0.0..=2.0).step(0.1),
+            Declaration::new("gains.p", 1.0).range(0.0..=2.0),
             Declaration::new("gains.inner.d", 0.0),
-            Declaration::new("count", 4_i64).integer_range(0..=11, 4),
+            Declaration::new("count", 4_i64).integer_range(0..=11),
             Declaration::new("frame", "map").checked("not empty", |_, value| {
                 if value.as_str() == Some("") { Err("must not be empty".into()) } else { Ok(()) }
             }),
@@ -165,14 +165,14 @@ mod tests {
     }
 
     #[test]
-    fn values_off_range_or_off_step_are_refused_and_leave_no_trace() {
+    fn values_off_range_are_refused_and_leave_no_trace() {
         let mut store = store();
         for (name, value) in [
             ("rate", Value::Double(0.5)),
             ("rate", Value::Double(500.1)),
             ("rate", Value::Double(f64::INFINITY)),
-            ("gains.p", Value::Double(0.15)),
-            ("count", Value::Integer(5)),
+            ("gains.p", Value::Double(-0.5)),
+            ("count", Value::Integer(-1)),
             ("count", Value::Integer(12)),
         ] {
             assert!(
@@ -183,8 +183,7 @@ mod tests {
         assert!(matches!(set(&mut store, "rate", f64::NAN), Err(Refusal::NotANumber { .. })));
         assert_eq!(store.take_changes(), []);
         assert_eq!(set(&mut store, "gains.p", 0.7), Ok(()));
-        assert_eq!(set(&mut store, "count", 8_i64), Ok(()));
-        assert_eq!(set(&mut store, "count", 11_i64), Ok(()), "the end is on every step");
+        assert_eq!(set(&mut store, "count", 11_i64), Ok(()));
     }
 
     #[test]
@@ -245,7 +244,7 @@ mod tests {
     fn a_descriptor_says_all_that_was_declared() {
         let descriptor = store().descriptor("gains.p");
         assert_eq!(descriptor.kind, 3);
-        let range = FloatingPointRange { from_value: 0.0, to_value: 2.0, step: 0.1 };
+        let range = FloatingPointRange { from_value: 0.0, to_value: 2.0, step: 0.0 };
         assert_eq!(descriptor.floating_point_range, [range]);
         assert_eq!(store().descriptor("count").integer_range.len(), 1);
         assert!(store().descriptor("use_sim_time").read_only);

@@ -88,22 +88,7 @@ impl Value {
     pub fn widened(self, like: &Value) -> Value {
         match (self, like) {
             (Value::Integer(value), Value::Double(_)) => Value::Double(value as f64),
-            (Value::Integers(values), Value::Doubles(_)) => {
-                Value::Doubles(values.into_iter().map(|value| value as f64).collect())
-            }
-            // An empty list says nothing of its type.
-            (value, Value::Doubles(_)) if value.is_empty_list() => Value::Doubles(Vec::new()),
             (value, _) => value,
-        }
-    }
-
-    fn is_empty_list(&self) -> bool {
-        match self {
-            Value::Bytes(list) => list.is_empty(),
-            Value::Bools(list) => list.is_empty(),
-            Value::Integers(list) => list.is_empty(),
-            Value::Strings(list) => list.is_empty(),
-            _ => false,
         }
     }
 }
@@ -147,8 +132,6 @@ mod tests {
     #[test]
     fn whole_numbers_are_read_as_numbers_only_where_numbers_are_meant() {
         assert_eq!(Value::Integer(5).widened(&Value::Double(0.0)), Value::Double(5.0));
-        assert_eq!(Value::Integers(vec![5]).widened(&Value::Doubles(vec![])), Value::Doubles(vec![5.0]));
-        assert_eq!(Value::Strings(vec![]).widened(&Value::Doubles(vec![])), Value::Doubles(vec![]));
         assert_eq!(Value::Integer(5).widened(&Value::Bool(true)), Value::Integer(5));
         assert_eq!(Value::Double(5.0).widened(&Value::Integer(0)), Value::Double(5.0));
     }
