@@ -9,6 +9,7 @@
 //! ordinary store first reads the cache line it is about to overwrite (write-allocate). Rooflines
 //! divide what they move by what was moved: the second number.
 
+use crate::solve::stopwatch::median;
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -80,26 +81,9 @@ pub(super) fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     sorted.get(rank.saturating_sub(1)).copied()
 }
 
-/// The middle value, or the mean of the two; sorts the values. NaN of none.
-pub(super) fn median(values: &mut [f64]) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    match (values.len() / 2, values.len() % 2) {
-        (0, 0) => f64::NAN,
-        (middle, 0) => f64::midpoint(values[middle - 1], values[middle]),
-        (middle, _) => values[middle],
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_slow_pass_does_not_move_the_median() {
-        assert_eq!(median(&mut [2.0, 1e9, 1.0]), 2.0);
-        assert_eq!(median(&mut [3.0, 1e9, 1.0, 2.0]), 2.5);
-        assert!(median(&mut []).is_nan());
-    }
 
     #[test]
     fn the_triad_writes_all_of_its_elements_and_counts_its_bytes() {

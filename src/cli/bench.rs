@@ -34,7 +34,6 @@ pub enum BenchCommand {
     #[command(after_help = "Example:\n  flockform bench sweep --json > sweep.json")]
     Sweep(BenchArguments),
     /// Robots per millisecond for neighbour query, rule, safety filter and whole tick; pose to target over loopback
-    #[cfg(feature = "swarm")]
     #[command(after_help = "Example:\n  flockform bench swarm --json > swarm.json")]
     Swarm(BenchArguments),
     /// Latency and CPU of carrying poses: in process, iceoryx2, ours over it, Unix socket, DDS over loopback
@@ -63,7 +62,6 @@ pub enum BenchCommand {
         out: OutArguments,
     },
     /// Seconds to equilibrium by multigrid, beside a factorisation of the same system
-    #[cfg(feature = "fem")]
     #[command(after_help = "Example:\n  flockform bench equilibrium --json > equilibrium.json")]
     Equilibrium(BenchArguments),
 }
@@ -72,7 +70,6 @@ pub enum BenchCommand {
 pub fn bench(command: BenchCommand) -> Result<(), Refusal> {
     match command {
         BenchCommand::Sweep(bench) => bench.print(&bench::sweep::run(bench.quick)?),
-        #[cfg(feature = "swarm")]
         BenchCommand::Swarm(bench) => bench.print(&bench::swarm::run(bench.quick)),
         BenchCommand::Transport { bench, out } => {
             let folder = out.folder()?;
@@ -85,7 +82,6 @@ pub fn bench(command: BenchCommand) -> Result<(), Refusal> {
             Ok(())
         }
         BenchCommand::Scale { bench, large, ranks, out } => scale(bench, large, ranks.map(usize::from), &out),
-        #[cfg(feature = "fem")]
         BenchCommand::Equilibrium(bench) => bench.print(&bench::equilibrium::run(bench.quick)?),
     }
 }

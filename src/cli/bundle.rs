@@ -1,7 +1,6 @@
 //! `flockform list`, `show` and `new`: the bundled files, and a file of one's own that begins as one of them.
 
-use std::fs::File;
-use std::io::{ErrorKind, Write};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -132,15 +131,10 @@ fn heading(kind: Kind, file: &Bundled, path: &Path) -> String {
     )
 }
 
-/// Writes a file that is not there yet; nothing of it stays if it cannot be written whole.
+/// Writes a file that is not there yet.
 fn write_new(path: &Path, text: &str) -> Result<(), Refusal> {
-    let failed = |source: std::io::Error| match source.kind() {
+    flockform::export::write_new(path, text).map_err(|source| match source.kind() {
         ErrorKind::AlreadyExists => Refusal::Exists(path.to_owned()),
         _ => Refusal::NewFile { path: path.to_owned(), source },
-    };
-    let mut file = File::create_new(path).map_err(failed)?;
-    file.write_all(text.as_bytes()).map_err(|error| {
-        let _ = std::fs::remove_file(path);
-        Refusal::NewFile { path: path.to_owned(), source: error }
     })
 }

@@ -11,7 +11,7 @@ use flockform::engine::Engine;
 use flockform::engine::state::EngineState;
 use flockform::export::checkpoint::{Checkpoint, CheckpointError, RunRequest};
 use flockform::export::report::RunRecorder;
-use flockform::export::{Drawn, ExportError, OutputFolder, VtkSeries, unfinished};
+use flockform::export::{Drawn, ExportError, OutputFolder, VtkSeries, out_of, unfinished};
 use flockform::scene::Scene;
 
 use super::interrupt;
@@ -105,11 +105,7 @@ pub struct ResumedRun {
 impl ResumedRun {
     /// A killed run stands beside the place of its results, an interrupted one in it.
     fn find(dir: &Path) -> Result<Self, CheckpointError> {
-        // Outputs go where a link leads, and so do those that are not finished.
-        let full = dir.canonicalize().ok().filter(|_| dir.is_symlink());
-        let dir = full.as_deref().unwrap_or(dir);
-        let stem = dir.file_stem().filter(|_| dir.extension().is_some_and(|ending| ending == "unfinished"));
-        let out = stem.map_or_else(|| dir.to_owned(), |stem| dir.with_file_name(stem));
+        let out = out_of(dir);
         for folder in [unfinished(&out), out.clone()] {
             if let Some(mut checkpoint) = Checkpoint::read(&folder)? {
                 let fingerprint = checkpoint.fingerprint();

@@ -61,7 +61,6 @@ fn left() -> MutexGuard<'static, Left> {
 pub fn watch() {
     // A file beyond the largest that the shell allows is then an error like a full disk, in words, and not a signal.
     // SAFETY: no handler is called, and no other thread runs yet.
-    #[cfg(feature = "ros")]
     unsafe {
         libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
     }

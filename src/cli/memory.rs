@@ -5,7 +5,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::fs::read_to_string;
 use std::path::Path;
 
-use flockform::continuum::memory::readable_bytes;
+use flockform::continuum::memory::{field, own, readable_bytes};
 use flockform::continuum::plan::Plan;
 use flockform::export::memory::Outputs;
 use flockform::scene::{Scene, SceneError};
@@ -32,11 +32,6 @@ pub fn of_part(scene: &Scene, plan: &Plan, ranks: usize, (outputs, writes): (Out
 /// Bytes of the program's code so far; a guess where the system does not say.
 fn code() -> usize {
     own("RssFile:").unwrap_or(16 << 20) as usize
-}
-
-/// A number of the status of this process \[B\].
-fn own(name: &str) -> Option<u64> {
-    Some(1024 * field(&read_to_string("/proc/self/status").ok()?, name)?)
 }
 
 /// Refuses a scene whose run takes more bytes than there are, so that no kernel has to end it on the way.
@@ -70,7 +65,7 @@ const LARGE: usize = 1 << 17;
 /// again and again is faster without.
 pub fn return_what_is_dropped() {
     // SAFETY: the call sets a number of the allocator; no other thread runs yet.
-    #[cfg(all(feature = "ros", target_env = "gnu"))]
+    #[cfg(target_env = "gnu")]
     unsafe {
         libc::mallopt(libc::M_MMAP_THRESHOLD, LARGE as libc::c_int);
     }
@@ -173,7 +168,7 @@ unsafe impl GlobalAlloc for ArrayAllocator {
 /// Gives back the memory of small arrays that were dropped, such as the frames of a small body.
 pub fn return_what_is_free() {
     // SAFETY: the call asks nothing of its caller.
-    #[cfg(all(feature = "ros", target_env = "gnu"))]
+    #[cfg(target_env = "gnu")]
     unsafe {
         libc::malloc_trim(0);
     }
@@ -193,12 +188,6 @@ fn room() -> Option<Room> {
     let taken = own("VmSize:").unwrap_or(0);
     let limit = limit.map(|limit| Room { bytes: limit.saturating_sub(taken), bound: "`ulimit -v`" });
     [machine, groups, limit].into_iter().flatten().min_by_key(|room| room.bytes)
-}
-
-/// The number behind a word of a text, if there is one.
-fn field(text: &str, name: &str) -> Option<u64> {
-    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
-    line.split_whitespace().next()?.parse().ok()
 }
 
 /// The least room in the control groups that a process is in, as `/proc/self/cgroup` names them.

@@ -290,7 +290,6 @@ pub enum Refusal {
     Install(#[from] install::InstallError),
     #[error("no threads to measure with: {0}")]
     Bench(#[from] rayon::ThreadPoolBuildError),
-    #[cfg(feature = "fem")]
     #[error("{0}")]
     BenchEquilibrium(#[from] flockform::bench::equilibrium::EquilibriumError),
     #[error("{0}")]

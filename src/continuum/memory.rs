@@ -20,6 +20,17 @@ use crate::solve::equilibrium::{
     Choice, DIRECT_UP_TO, FACTORISED_UP_TO, INCOMPRESSIBLE_UP_TO, Precision, Solver, UNSYMMETRIC_UP_TO,
 };
 
+/// A number of the status of this process, where the system has one \[B\].
+pub fn own(name: &str) -> Option<u64> {
+    Some(1024 * field(&std::fs::read_to_string("/proc/self/status").ok()?, name)?)
+}
+
+/// The number behind a word of a text, if there is one.
+pub fn field(text: &str, name: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
+    line.split_whitespace().next()?.parse().ok()
+}
+
 /// Fewest bytes that a run of a scene takes, known before anything is laid out; 0 where its layout is refused anyway.
 pub fn at_least(scene: &Scene) -> f64 {
     let particles = match &scene.body {

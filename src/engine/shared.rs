@@ -19,12 +19,13 @@ use super::movement;
 use super::observer::Observer;
 use crate::flock::body::Body;
 use crate::flock::fracture::{Bonds, Break};
+use crate::flock::halo::{Halo, put, words};
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::part::Part;
 use crate::flock::vectors::{Vectors, distance};
 use crate::ranks::{Team, added};
 use crate::sweep::caches::Caches;
-use crate::sweep::domain::{Domain, Halo, Held, Needs, Share};
+use crate::sweep::domain::{Domain, Held, Needs, Share};
 use crate::sweep::{Activity, Order, Stage, Steps};
 
 /// The particles whose positions a rank knows, now and before the last step.
@@ -263,7 +264,7 @@ pub(super) fn take_steps(
     let mut under_way = steps.begin(activity);
     let mut stage = Stage::All;
     if let Some((team, halo)) = halo {
-        let (sent, sizes) = messages(&halo, &[&*present]);
+        let (sent, sizes) = halo.messages(&[&*present]);
         let received = team.swap_while(&sent, &sizes, &mut || {
             if beyond == 0 && steps.has_inside() {
                 steps.go_on(
@@ -275,7 +276,7 @@ pub(super) fn take_steps(
                 stage = Stage::Rim;
             }
         });
-        put_all(&halo, &received, &mut [&mut *present]);
+        halo.put(&received, &mut [&mut *present]);
     }
     steps.go_on(&mut under_way, stage, present.components_mut(), previous.components_mut());
     steps.end(under_way, activity)
@@ -314,26 +315,8 @@ pub(crate) fn seen_in_a_step(body: &Body, neighbours: &Neighbours) -> Range<usiz
 
 /// Receives positions of others.
 fn receive<const N: usize>(team: &Team, halo: &Halo, mut points: [&mut Vectors; N]) {
-    let (sent, sizes) = messages(halo, &points.each_ref().map(|points| &**points));
-    put_all(halo, &team.swap(&sent, &sizes), &mut points);
-}
-
-/// What is sent, and how many words are received: (rank, words).
-#[allow(clippy::type_complexity)]
-fn messages(halo: &Halo, points: &[&Vectors]) -> (Vec<(usize, Vec<u64>)>, Vec<(usize, usize)>) {
-    let sent = |(rank, of): &(usize, Range<usize>)| {
-        (*rank, points.iter().flat_map(|points| words(points, of)).collect())
-    };
-    let size = |(rank, of): &(usize, Range<usize>)| (*rank, 2 * points.len() * of.len());
-    (halo.sends.iter().map(sent).collect(), halo.receives.iter().map(size).collect())
-}
-
-fn put_all(halo: &Halo, received: &[Vec<u64>], points: &mut [&mut Vectors]) {
-    for ((_, of), words) in halo.receives.iter().zip(received) {
-        for (points, words) in points.iter_mut().zip(words.chunks_exact(2 * of.len())) {
-            put(points, of, words);
-        }
-    }
+    let (sent, sizes) = halo.messages(&points.each_ref().map(|points| &**points));
+    halo.put(&team.swap(&sent, &sizes), &mut points);
 }
 
 impl Part {
@@ -375,18 +358,6 @@ fn gather_points<const N: usize>(
         rest = &rest[more.len()..];
     }
     mores
-}
-
-/// Coordinates as words: x, then y.
-fn words(points: &Vectors, of: &Range<usize>) -> Vec<u64> {
-    points.x[of.clone()].iter().chain(&points.y[of.clone()]).map(|value| value.to_bits()).collect()
-}
-
-fn put(points: &mut Vectors, of: &Range<usize>, words: &[u64]) {
-    let (x, y) = words.split_at(of.len());
-    for (to, words) in [(&mut points.x, x), (&mut points.y, y)] {
-        to[of.clone()].iter_mut().zip(words).for_each(|(value, &bits)| *value = f64::from_bits(bits));
-    }
 }
 
 /// An observer on each rank: the first one says when they look, and any of them can break the run off.

@@ -215,6 +215,16 @@ pub fn unfinished(out: &Path) -> PathBuf {
     out.with_file_name(name)
 }
 
+/// Where the results of a run go that is taken up again, by the name of that place or of the folder of its checkpoints; links are
+/// followed, as by those who write there.
+pub fn out_of(dir: &Path) -> PathBuf {
+    let followed = |path: PathBuf| path.canonicalize().ok().filter(|_| path.is_symlink()).unwrap_or(path);
+    let dir = followed(dir.to_owned());
+    let stem = dir.file_stem().filter(|_| dir.extension().is_some_and(|ending| ending == "unfinished"));
+    let out = stem.map(|stem| dir.with_file_name(stem));
+    out.map_or(dir, followed)
+}
+
 fn in_full(out: &Path) -> Result<PathBuf, ExportError> {
     if out.file_name().is_none() {
         return Err(ExportError::Unnamed(out.to_owned()));
@@ -385,4 +395,27 @@ pub(super) fn beside(out: &Path, what: &str, attempt: u32) -> PathBuf {
 
 fn rename(from: &Path, to: &Path) -> Result<(), ExportError> {
     fs::rename(from, to).map_err(ExportError::io("rename the finished folder to", to))
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_go_where_links_lead_whatever_they_are_called_by() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        let real = folder.path().canonicalize().expect("a folder");
+        std::fs::create_dir(at("x")).expect("made");
+        std::fs::create_dir(at("y.unfinished")).expect("made");
+        for (link, to) in [("to-x", "x"), ("to-y", "y.unfinished")] {
+            std::os::unix::fs::symlink(at(to), at(link)).expect("made");
+        }
+        assert_eq!(out_of(&at("x")), at("x"));
+        assert_eq!(out_of(&at("x.unfinished")), at("x"));
+        assert_eq!(out_of(&at("to-x")), real.join("x"));
+        assert_eq!(out_of(&at("to-x.unfinished")), real.join("x"));
+        assert_eq!(out_of(&at("to-y")), real.join("y"));
+        assert_eq!(out_of(&at("y")), at("y"));
+    }
 }

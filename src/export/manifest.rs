@@ -92,6 +92,16 @@ pub(crate) fn create_buffered(path: &Path) -> io::Result<BufWriter<File>> {
     create(path).map(BufWriter::new)
 }
 
+/// Writes a file that is not there yet; nothing of it stays if it cannot be written whole.
+///
+/// # Errors
+/// Those of the system.
+pub fn write_new(path: &Path, text: &str) -> io::Result<()> {
+    File::create_new(path)?.write_all(text.as_bytes()).inspect_err(|_| {
+        let _ = fs::remove_file(path);
+    })
+}
+
 fn line(name: &Path) -> String {
     let parts: Vec<_> = name.components().map(|part| part.as_os_str().to_string_lossy()).collect();
     parts.join("/")

@@ -99,7 +99,8 @@ use crate::scene::Scene;
 use crate::scene::units::Units;
 pub use error::ExportError;
 use figures::{Formats, Subject};
-pub use folder::{OutputFolder, unfinished};
+pub use folder::{OutputFolder, out_of, unfinished};
+pub use manifest::write_new;
 pub use summary::{
     BrokenBonds, Counts, Energies, Equilibrium, FirstBreak, Measured, Seconds, Signed, Summary, Timings,
 };

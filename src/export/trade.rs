@@ -40,11 +40,7 @@ pub fn write_trade(folder: &OutputFolder, study: &Study) -> Result<Vec<PathBuf>,
 }
 
 fn row(point: &Point, on_the_front: bool) -> Row<'_> {
-    let (outcome, reason) = match &point.outcome {
-        Outcome::Settled => ("settled", ""),
-        Outcome::Unsettled => ("unsettled", ""),
-        Outcome::Refused { reason } => ("refused", reason.as_str()),
-    };
+    let (outcome, reason) = point.outcome.words();
     Row {
         rule: point.setting.rule.name(),
         spacing: point.setting.spacing,

@@ -84,7 +84,7 @@ pub(crate) fn along_side(mesh: &Mesh, side: Side, s: f64) -> ([f64; 2], [f64; 2]
 pub struct Problem {
     /// The body, undeformed.
     pub mesh: Mesh,
-    /// The material, the same everywhere.
+    /// The material of all cells that are in no inclusion.
     pub material: Material,
     /// The measure of strain; loads keep direction and place of application wherever the body turns.
     pub strain: Strain,

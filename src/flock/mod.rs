@@ -16,6 +16,7 @@ pub mod condition;
 pub mod fracture;
 pub mod frame;
 pub mod grid;
+pub mod halo;
 pub mod lanes;
 pub mod lattice;
 pub mod law;

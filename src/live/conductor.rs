@@ -1,7 +1,7 @@
 //! Runs a session: steps at the speed asked for, what viewers ask in between, and the latest state for all of them.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -16,6 +16,7 @@ use super::session::{Frame, Session, Viewer};
 use super::state::{Board, Published};
 use crate::export::report::live_page;
 use crate::export::shell::quoted;
+use crate::export::write_new;
 
 /// Time from one state that is shown to the next, at least.
 const SHOWN_EVERY: Duration = Duration::from_micros(16_000);
@@ -364,15 +365,6 @@ fn answered(answer: Result<String, String>) -> Value {
         Ok(words) => json!({ "event": "done", "words": words }),
         Err(words) => json!({ "event": "refused", "words": words }),
     }
-}
-
-/// Writes a file that is not there yet; nothing of it stays if it cannot be written whole.
-fn write_new(path: &Path, text: &str) -> std::io::Result<()> {
-    use std::io::Write;
-    let mut file = std::fs::File::create_new(path)?;
-    file.write_all(text.as_bytes()).inspect_err(|_| {
-        let _ = std::fs::remove_file(path);
-    })
 }
 
 /// Kinds of binary messages, which begin with it.

@@ -142,10 +142,9 @@ impl Swarm {
 
     fn squeeze(&mut self, viewer: Viewer, by: [f64; 2]) -> Result<(), Refused> {
         let hand = self.history.now.hands.get(&viewer).cloned();
-        let Some(hand @ Hand { held: Held::Leaders(_), .. }) = hand else {
+        let Some((hand, Held::Leaders(leaders))) = hand.map(|hand| (hand.clone(), hand.held)) else {
             return Err("no leaders are held".into());
         };
-        let Held::Leaders(leaders) = hand.held.clone() else { return Ok(()) };
         let share = 1.0 / leaders.len() as f64;
         let middle = [0, 1].map(|k| leaders.iter().map(|(_, place)| place[k] * share).sum::<f64>());
         let to = |place: [f64; 2]| [0, 1].map(|k| middle[k] + by[k] * (place[k] - middle[k]));

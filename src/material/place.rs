@@ -2,7 +2,10 @@
 
 use super::cells::Cells;
 use crate::flock::vectors::{Vectors, distance};
+use crate::geometry::lists::sides;
+use crate::geometry::piece::Piece;
 use crate::geometry::point::{Point, dot, minus};
+use crate::geometry::shape::is_in_polygon;
 
 /// The particles around a place, and shares with which they stand for it: linear fields are met exactly.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,20 +57,17 @@ impl Around {
 
 /// The point of a polygon nearest to a place: itself inside.
 fn nearest(corners: &[Point], place: Point) -> Point {
-    let sides = || (0..corners.len()).map(|k| (corners[k], corners[(k + 1) % corners.len()]));
-    let crosses = |(a, b): &(Point, Point)| {
-        let at = || a[0] + (place[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0]);
-        (a[1] > place[1]) != (b[1] > place[1]) && at() > place[0]
-    };
-    if sides().filter(crosses).count() % 2 == 1 {
+    if is_in_polygon(corners, place) {
         return place;
     }
-    let on_side = |(a, b): (Point, Point)| {
-        let [along, to] = [minus(b, a), minus(place, a)];
-        let t = (dot(along, to) / dot(along, along)).clamp(0.0, 1.0);
-        [0, 1].map(|k| a[k] + t * along[k])
+    let on_side = |[a, b]: [Point; 2]| {
+        let side = Piece::edge(a, b);
+        side.point(side.nearest(place))
     };
-    sides().map(on_side).min_by(|a, b| distance(*a, place).total_cmp(&distance(*b, place))).unwrap_or(place)
+    sides(corners)
+        .map(on_side)
+        .min_by(|a, b| distance(*a, place).total_cmp(&distance(*b, place)))
+        .unwrap_or(place)
 }
 
 /// Mean value coordinates: K. Hormann and M. S. Floater, ACM Trans. Graph. 25 (2006) 1424-1441, for any polygon.

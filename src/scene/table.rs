@@ -7,9 +7,9 @@ use crate::flock::vectors::distance;
 /// Rows of a displacement file, and how they name their particle.
 #[derive(Clone, Debug, PartialEq)]
 pub enum DisplacementTable {
-    /// `x,y,ux,uy`: by reference position \[length\].
+    /// `x,y,ux,uy`: by reference position \[length\], in order of x.
     ByPlace(Vec<([f64; 2], Displaced)>),
-    /// `id,ux,uy`: by id, counted from 1.
+    /// `id,ux,uy`: by id, counted from 1, in their order.
     ById(Vec<(usize, Displaced)>),
 }
 
@@ -51,6 +51,9 @@ impl DisplacementTable {
             }
             Ok(())
         })?;
+        // Rows of one particle stay in the order of the file.
+        ids.sort_by_key(|row| row.0);
+        places.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
         Ok(if by_id { Self::ById(ids) } else { Self::ByPlace(places) })
     }
 
@@ -66,8 +69,18 @@ impl DisplacementTable {
                 let (place, id) = (body.reference.get(i), body.id(i));
                 let is_at = |at: [f64; 2]| distance(at, place) <= near;
                 let rows: Vec<Displaced> = match self {
-                    Self::ById(rows) => rows.iter().filter(|row| row.0 == id).map(|row| row.1).collect(),
-                    Self::ByPlace(rows) => rows.iter().filter(|row| is_at(row.0)).map(|row| row.1).collect(),
+                    Self::ById(rows) => {
+                        let from = rows.partition_point(|row| row.0 < id);
+                        rows[from..].iter().take_while(|row| row.0 == id).map(|row| row.1).collect()
+                    }
+                    Self::ByPlace(rows) => {
+                        let from = rows.partition_point(|row| row.0[0] < place[0] - near);
+                        let beside = rows[from..].iter().take_while(|row| row.0[0] <= place[0] + near);
+                        let mut found: Vec<Displaced> =
+                            beside.filter(|row| is_at(row.0)).map(|row| row.1).collect();
+                        found.sort_by_key(|row| row.line);
+                        found
+                    }
                 };
                 let particle = || format!("particle {id} at ({}, {})", place[0], place[1]);
                 let first = rows.first().ok_or_else(|| format!("no row for {}", particle()))?;

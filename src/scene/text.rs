@@ -18,9 +18,13 @@ pub fn counted(count: usize, what: &str) -> String {
 /// From here on numbers are written with a power of ten: their digits would say nothing.
 const LONG: f64 = 1e15;
 
+/// So are those below this one, which begin with as many zeros.
+const SHORT: f64 = 1e-15;
+
 /// A number as it is, or with a power of ten if it would be hundreds of digits long.
 pub fn number(value: f64) -> String {
-    if value.abs() < LONG { value.to_string() } else { format!("{value:e}") }
+    let is_plain = value == 0.0 || !value.is_finite() || (SHORT..LONG).contains(&value.abs());
+    if is_plain { value.to_string() } else { format!("{value:e}") }
 }
 
 /// The same to so many decimal places.

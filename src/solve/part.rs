@@ -8,6 +8,7 @@ use std::ops::Range;
 
 use super::field::Real;
 use super::operator::Matrix;
+use crate::flock::halo::Halo;
 use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
 
@@ -67,53 +68,24 @@ impl Cuts {
         self.particles[rank]..self.particles[rank + 1]
     }
 
+    /// The halo of a rank; `read_by` are the particles that a rank reads, which may be its own.
+    pub fn halo(&self, rank: usize, read_by: impl Fn(usize) -> Range<usize>) -> Halo {
+        Halo::new((rank, self.ranks()), |owner| self.particles_of(owner), read_by)
+    }
+
     /// Whether more than one rank owns something.
     pub fn is_shared(&self) -> bool {
         self.groups.windows(2).filter(|ends| ends[0] < ends[1]).count() > 1
     }
 }
 
-/// Particles that ranks send each other.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Halo {
-    /// To each rank that reads some of this one's.
-    sends: Vec<(usize, Range<usize>)>,
-    /// From each rank that owns some of what this one reads.
-    receives: Vec<(usize, Range<usize>)>,
-}
-
-impl Halo {
-    /// The halo of a rank; `read_by` are the particles that a rank reads, which may be its own.
-    pub fn new(rank: usize, owned: &Cuts, read_by: impl Fn(usize) -> Range<usize>) -> Self {
-        let both = |owner: usize, reader: usize| {
-            let (owned, read) = (owned.particles_of(owner), read_by(reader));
-            Some(owned.start.max(read.start)..owned.end.min(read.end)).filter(|both| !both.is_empty())
-        };
-        let others = || (0..owned.ranks()).filter(|&other| other != rank);
-        let sends = others().filter_map(|other| Some((other, both(rank, other)?))).collect();
-        let receives = others().filter_map(|other| Some((other, both(other, rank)?))).collect();
-        Self { sends, receives }
+/// Exchanges the particles of a vector.
+pub fn receive<T: Real>(halo: &Halo, team: &Team, v: &mut Vectors<T>) {
+    if *halo == Halo::default() {
+        return;
     }
-
-    /// The same where the first particle here is this one of the whole.
-    pub fn here(mut self, first: usize) -> Self {
-        let of_ranks = self.sends.iter_mut().chain(&mut self.receives);
-        of_ranks.for_each(|(_, of)| *of = of.start - first..of.end - first);
-        self
-    }
-
-    /// Exchanges the particles of a vector.
-    pub fn receive<T: Real>(&self, team: &Team, v: &mut Vectors<T>) {
-        if self.sends.is_empty() && self.receives.is_empty() {
-            return;
-        }
-        let sent: Vec<_> = self.sends.iter().map(|(rank, of)| (*rank, words(v, of))).collect();
-        let sizes: Vec<_> =
-            self.receives.iter().map(|(rank, of)| (*rank, words_per_particle::<T>() * of.len())).collect();
-        for ((_, of), words) in self.receives.iter().zip(team.swap(&sent, &sizes)) {
-            put(v, of, &words);
-        }
-    }
+    let (sent, sizes) = halo.messages(&[&*v]);
+    halo.put(&team.swap(&sent, &sizes), &mut [v]);
 }
 
 /// The part of a matrix that this rank computes.
@@ -130,7 +102,7 @@ pub struct Part {
 impl Part {
     /// The part of this rank in a window that begins with the `first` particle of the whole; `read_by` are all that a rank reads.
     pub fn in_window(team: &Team, cuts: Cuts, first: usize, read_by: impl Fn(usize) -> Range<usize>) -> Self {
-        let halo = Halo::new(team.rank(), &cuts, read_by).here(first);
+        let halo = cuts.halo(team.rank(), read_by).here(first);
         Self { team: team.clone(), cuts, halo }
     }
 
@@ -163,7 +135,7 @@ impl Part {
 
     /// Makes known what the rows of this rank's particles lead to.
     pub fn receive<T: Real>(&self, v: &mut Vectors<T>) {
-        self.halo.receive(&self.team, v);
+        receive(&self.halo, &self.team, v);
     }
 }
 
@@ -178,33 +150,6 @@ fn read_by(matrix: &Matrix, cuts: &Cuts, rank: usize) -> Range<usize> {
     let [first, end] = [groups.start, groups.end].map(|group| matrix.group_columns[group]);
     let reach = matrix.reach_across();
     if groups.is_empty() { 0..0 } else { matrix.columns.particles(first - reach..end + reach) }
-}
-
-/// Both components of single precision go into one word.
-pub const fn words_per_particle<T>() -> usize {
-    if size_of::<T>() == size_of::<f32>() { 1 } else { 2 }
-}
-
-pub fn words<T: Real>(v: &Vectors<T>, of: &Range<usize>) -> Vec<u64> {
-    let (x, y) = (&v.x[of.clone()], &v.y[of.clone()]);
-    if words_per_particle::<T>() == 1 {
-        x.iter().zip(y).map(|(x, y)| x.bits() | y.bits() << 32).collect()
-    } else {
-        x.iter().chain(y).map(|value| value.bits()).collect()
-    }
-}
-
-pub fn put<T: Real>(v: &mut Vectors<T>, of: &Range<usize>, words: &[u64]) {
-    let (x, y) = (&mut v.x[of.clone()], &mut v.y[of.clone()]);
-    if words_per_particle::<T>() == 1 {
-        for ((x, y), word) in x.iter_mut().zip(y).zip(words) {
-            (*x, *y) = (T::of_bits(word & u64::from(u32::MAX)), T::of_bits(word >> 32));
-        }
-    } else {
-        let (of_x, of_y) = words.split_at(of.len());
-        x.iter_mut().zip(of_x).for_each(|(x, &bits)| *x = T::of_bits(bits));
-        y.iter_mut().zip(of_y).for_each(|(y, &bits)| *y = T::of_bits(bits));
-    }
 }
 
 #[cfg(test)]

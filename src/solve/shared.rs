@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use super::field::Real;
 use super::operator::Columns;
-use super::part::{put, words, words_per_particle};
+use crate::flock::halo::{put, words, words_per_particle};
 use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
 

@@ -35,3 +35,26 @@ impl Stopwatch {
         Duration::ZERO
     }
 }
+
+/// The middle of several times, or the mean of the two; sorts them. NaN of none.
+#[cfg(any(feature = "bench", feature = "fem"))]
+pub(crate) fn median(times: &mut [f64]) -> f64 {
+    times.sort_unstable_by(f64::total_cmp);
+    match (times.len() / 2, times.len() % 2) {
+        (0, 0) => f64::NAN,
+        (middle, 0) => f64::midpoint(times[middle - 1], times[middle]),
+        (middle, _) => times[middle],
+    }
+}
+
+#[cfg(all(test, any(feature = "bench", feature = "fem")))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slow_pass_does_not_move_the_median() {
+        assert_eq!(median(&mut [2.0, 1e9, 1.0]), 2.0);
+        assert_eq!(median(&mut [3.0, 1e9, 1.0, 2.0]), 2.5);
+        assert!(median(&mut []).is_nan());
+    }
+}

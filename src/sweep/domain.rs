@@ -9,6 +9,7 @@ use std::ops::Range;
 use super::caches::Caches;
 use super::rows::Rows;
 use super::schedule::MOST_STEPS;
+use crate::flock::halo::Halo;
 
 /// Bands that a rank owns for each step taken together: the halo, which is computed twice, is at most a quarter of what a
 /// rank computes on either side.
@@ -109,16 +110,6 @@ impl Needs {
         let needed = words[5..].chunks_exact(2).map(range).collect();
         Self { owned: range(&words[..2]), seen: range(&words[2..4]), steps: words[4] as usize, needed }
     }
-}
-
-/// Particles that a rank sends and receives before steps: (rank, particles that stand here), at most one stretch for each
-/// rank.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Halo {
-    /// Particles of this rank that others need.
-    pub sends: Vec<(usize, Range<usize>)>,
-    /// Particles of others that this rank needs.
-    pub receives: Vec<(usize, Range<usize>)>,
 }
 
 impl Domain {
@@ -246,15 +237,8 @@ impl Domain {
     }
 
     fn halo_of(&self, needed: impl Fn(&Needs) -> &Range<usize>) -> Halo {
-        let others = (0..self.shares.len()).filter(|&rank| rank != self.rank);
-        let mut halo = Halo::default();
-        for other in others {
-            let sent = meet(needed(&self.shares[other]), &self.of(self.rank));
-            let received = meet(needed(&self.shares[self.rank]), &self.of(other));
-            halo.sends.extend(sent.map(|particles| (other, self.here(&particles))));
-            halo.receives.extend(received.map(|particles| (other, self.here(&particles))));
-        }
-        halo
+        let needed = |rank: usize| needed(&self.shares[rank]).clone();
+        Halo::new((self.rank, self.shares.len()), |rank| self.of(rank), needed).here(self.first)
     }
 
     /// How many particles each rank receives before so many steps, shape \[ranks\].
@@ -267,12 +251,6 @@ impl Domain {
 /// How many steps a rank of so many bands takes together.
 pub fn steps_of(bands: usize) -> usize {
     (bands / BANDS_A_STEP).clamp(1, MOST_STEPS)
-}
-
-/// The intersection of both stretches, if any.
-fn meet(a: &Range<usize>, b: &Range<usize>) -> Option<Range<usize>> {
-    let both = a.start.max(b.start)..a.end.min(b.end);
-    (!both.is_empty()).then_some(both)
 }
 
 /// Where to cut things that cost so much into parts that cost about the same; shape \[parts + 1\].
@@ -341,12 +319,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn stretches_meet_in_what_both_have() {
-        assert_eq!(meet(&(2..7), &(5..9)), Some(5..7));
-        assert_eq!(meet(&(2..5), &(5..9)), None);
-        assert_eq!(meet(&(0..0), &(0..9)), None);
     }
 }

@@ -32,12 +32,13 @@ pub use schedule::{Activity, Led, MOST_STEPS};
 pub(crate) use schedule::{Stage, Steps};
 
 use crate::flock::frame::Frame;
+use crate::flock::halo::Halo;
 use crate::flock::lanes::vectors;
 use crate::flock::law::{Flock, Weights};
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
 use caches::Caches;
-use domain::{Domain, Halo, Held, Share};
+use domain::{Domain, Held, Share};
 use kernel::Component;
 use rows::Rows;
 use terms::Compiled;

@@ -12,12 +12,13 @@ use std::time::Instant;
 use serde::Serialize;
 
 use self::beam::{Parts, Plate};
-use super::machine::median;
 use super::quick_note;
+use crate::continuum::memory::own;
 use crate::flock::vectors::Vectors;
 use crate::scene::text::counted;
 use crate::solve::equilibrium::{Choice, Request, SolveError, Solved, Solver, System, solve};
 use crate::solve::operator::OperatorError;
+use crate::solve::stopwatch::median;
 
 /// Relative errors that the time to reach is measured for.
 const ERRORS: [f64; 2] = [1e-2, 1e-6];
@@ -211,7 +212,7 @@ fn bytes_per_particle(parts: &Parts) -> Result<Option<f64>, EquilibriumError> {
     let before = reset_peak();
     let system = copy.system()?;
     solve(&system, &request(Solver::Multigrid, RESIDUAL, MOST_ITERATIONS))?;
-    let used = before.zip(status("VmHWM:")).map(|(before, peak)| peak.saturating_sub(before) as f64);
+    let used = before.zip(own("VmHWM:")).map(|(before, peak)| peak.saturating_sub(before) as f64);
     // The system's own forces, 16 bytes, were there before.
     Ok(used.map(|used| used / parts.sites.len() as f64 + BODY_BYTES + 16.0))
 }
@@ -219,14 +220,7 @@ fn bytes_per_particle(parts: &Parts) -> Result<Option<f64>, EquilibriumError> {
 /// Forgets the highest resident memory so far; returns what is resident now \[B\].
 fn reset_peak() -> Option<u64> {
     std::fs::write("/proc/self/clear_refs", "5").ok()?;
-    status("VmRSS:")
-}
-
-/// A figure of the process's status \[B\].
-fn status(key: &str) -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|line| line.starts_with(key))?;
-    line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kilobytes| kilobytes * 1024)
+    own("VmRSS:")
 }
 
 impl fmt::Display for Report {

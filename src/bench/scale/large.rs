@@ -7,7 +7,6 @@ use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
 use serde::Serialize;
 
 use super::super::grid::plan;
-use super::super::machine::median;
 use super::ranks::{engine, on_threads, single, step};
 use crate::continuum::equilibrium::shared_system;
 use crate::continuum::plan::Plan;
@@ -15,6 +14,7 @@ use crate::engine::Engine;
 use crate::ranks::Team;
 use crate::scene::Scene;
 use crate::solve::equilibrium::{Choice, Request, Solver, System, solve_shared};
+use crate::solve::stopwatch::median;
 use crate::sweep::MOST_STEPS;
 
 /// Sizes of what is measured.

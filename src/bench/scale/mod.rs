@@ -25,6 +25,7 @@ use super::grid::plan;
 use super::machine::processor;
 use crate::continuum::plan::Plan;
 use crate::ranks::Team;
+use crate::solve::stopwatch::median;
 
 /// Options of the measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -223,7 +224,7 @@ fn update_seconds(weak: &[Case]) -> f64 {
         let [columns, rows] = case.body;
         case.alone_seconds_per_step / grid([columns / case.ranks, rows]).load(1).updates
     };
-    super::machine::median(&mut weak.iter().map(of).collect::<Vec<f64>>())
+    median(&mut weak.iter().map(of).collect::<Vec<f64>>())
 }
 
 /// A case; its prediction comes later.

@@ -6,11 +6,12 @@ use std::time::{Duration, Instant};
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use super::super::grid::stirred;
-use super::super::machine::{median, seconds_each};
+use super::super::machine::seconds_each;
 use super::model::Link;
 use crate::continuum::plan::Plan;
 use crate::engine::Engine;
 use crate::ranks::{Exchange, Team, in_process};
+use crate::solve::stopwatch::median;
 use crate::sweep::MOST_STEPS;
 
 /// Words of the messages by which a link is measured: next to nothing, and a mebibyte.

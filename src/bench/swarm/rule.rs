@@ -12,12 +12,13 @@ use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 
 use super::Effort;
-use crate::bench::machine::{median, seconds_each};
+use crate::bench::machine::seconds_each;
 use crate::flock::grid::CellGrid;
 use crate::flock::law::{Flock, Weights};
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::rules::Rule;
 use crate::flock::vectors::Vectors;
+use crate::solve::stopwatch::median;
 use crate::swarm::safety::{Filter, Flags, Limits, Obstacles, Seen};
 
 /// How far robots see [m].

@@ -5,7 +5,8 @@ use std::hint::black_box;
 use serde::Serialize;
 
 use super::{Effort, formation};
-use crate::bench::machine::{median, seconds_each};
+use crate::bench::machine::seconds_each;
+use crate::solve::stopwatch::median;
 use crate::swarm::control::Control;
 use crate::swarm::watch::Pose;
 

@@ -5,12 +5,13 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::super::grid::{plan, stirred};
-use super::super::machine::{median, seconds_each};
+use super::super::machine::seconds_each;
 use crate::continuum::plan::Plan;
 use crate::continuum::record::{ProbeSeries, Snapshot};
 use crate::engine::Engine;
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
+use crate::solve::stopwatch::median;
 use crate::sweep::domain::Share;
 use crate::sweep::kernel::Component;
 use crate::sweep::rows::Rows;

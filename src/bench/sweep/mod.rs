@@ -14,7 +14,8 @@ mod table;
 use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
 use serde::Serialize;
 
-use super::machine::{Bandwidth, median, processor, time_triad};
+use super::machine::{Bandwidth, processor, time_triad};
+use crate::solve::stopwatch::median;
 use crate::sweep::chosen_here;
 use bodies::Subject;
 pub use capabilities::{Capability, measure as measure_capabilities};

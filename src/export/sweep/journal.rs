@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use serde::{Deserialize, Serialize};
 
 use super::super::error::{ExportError, write_file};
-use super::super::{OutputFolder, summary, unfinished};
+use super::super::{OutputFolder, out_of, summary, unfinished};
 use crate::scene::Scene;
 use crate::study::design::{Design, DesignError, Factor, Sampling, Shard};
 
@@ -179,10 +179,7 @@ pub struct StoredSweep {
 /// # Errors
 /// A folder without a sweep, or files that cannot be read.
 pub fn read(dir: &Path) -> Result<StoredSweep, SweepError> {
-    let stem = dir.file_stem().filter(|_| dir.extension().is_some_and(|ending| ending == "unfinished"));
-    let out = stem.map_or_else(|| dir.to_owned(), |stem| dir.with_file_name(stem));
-    // What a link leads to is what is replaced: an unfinished sweep stands beside that.
-    let out = if out.is_symlink() { fs::canonicalize(&out).unwrap_or(out) } else { out };
+    let out = out_of(dir);
     let candidates = [unfinished(&out), out.clone()];
     let holds = |folder: &PathBuf| fs::symlink_metadata(folder.join(REQUEST)).is_ok();
     let Some(folder) = candidates.into_iter().find(holds) else {

@@ -8,7 +8,7 @@
 //! W = k t^2 / 2      t = sum_c w_c (q_c - 2)      force on a particle: -k t v      v = sum_c w_c R_c g
 //! ```
 //!
-//! A particle feels the patches around itself and around its cell_neighbours, so its neighbours are up to two cells away.
+//! A particle feels the patches around itself and around those that share a cell with it, so its neighbours are up to two cells away.
 
 use super::corotated::{Corner, Element, OWN};
 use crate::flock::block::{Block, plus};

@@ -1,14 +1,12 @@
 //! The direct solve: sparse Cholesky where the operator is symmetric, sparse LU elsewhere, both from the
 //! library faer.
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::LltError;
+use faer::linalg::cholesky::llt::factor::LltError::NonPositivePivot;
 use faer::prelude::Solve;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymmetricOrdering, factorize_symbolic_cholesky,
-};
+use faer::sparse::linalg::LltError;
+use faer::sparse::linalg::solvers::{Llt, Lu};
 use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, MatMut, Par, Side};
+use faer::{MatMut, Side};
 
 use super::system::Prepared;
 use super::{Found, SolveError, Solver, steps};
@@ -21,16 +19,17 @@ pub(super) fn solve(prepared: &mut Prepared) -> Result<Found, SolveError> {
     let symmetric = prepared.symmetric;
     let sparse = Sparse::new(&prepared.matrix, symmetric);
     let mut unknowns = sparse.unknowns(&prepared.right);
+    let n = unknowns.len();
+    let right = MatMut::from_column_major_slice_mut(&mut unknowns, n, 1);
     let set_up = if symmetric {
-        let factor = Cholesky::new(&sparse)?;
+        let factor = sparse.cholesky()?;
         let set_up = begin.elapsed();
-        factor.solve(&mut unknowns);
+        factor.solve_in_place(right);
         set_up
     } else {
         let lu = sparse.lu()?;
         let set_up = begin.elapsed();
-        let n = unknowns.len();
-        lu.solve_in_place(MatMut::from_column_major_slice_mut(&mut unknowns, n, 1));
+        lu.solve_in_place(right);
         set_up
     };
     let displacement = sparse.displacements(&unknowns, prepared.matrix.count());
@@ -100,65 +99,29 @@ impl Sparse {
         field
     }
 
-    fn lu(&self) -> Result<faer::sparse::linalg::solvers::Lu<usize, f64>, SolveError> {
+    /// As it is stored.
+    fn columns(&self) -> SparseColMatRef<'_, usize, f64> {
         let n = self.size();
-        let failed = |reason: String| SolveError::Factorisation { unknowns: n, reason };
         let pattern = SymbolicSparseColMatRef::new_checked(n, n, &self.starts, None, &self.rows);
-        let transposed = SparseColMatRef::new(pattern, &self.values[..]);
+        SparseColMatRef::new(pattern, &self.values[..])
+    }
+
+    fn failed(&self, reason: impl std::fmt::Debug) -> SolveError {
+        SolveError::Factorisation { unknowns: self.size(), reason: format!("{reason:?}") }
+    }
+
+    fn cholesky(&self) -> Result<Llt<usize, f64>, SolveError> {
+        self.columns().sp_cholesky(Side::Lower).map_err(|error| match error {
+            LltError::Numeric(NonPositivePivot { .. }) => {
+                SolveError::NotPositive { solver: Solver::Direct, iteration: 0 }
+            }
+            LltError::Generic(error) => self.failed(error),
+        })
+    }
+
+    fn lu(&self) -> Result<Lu<usize, f64>, SolveError> {
         let matrix: SparseColMat<usize, f64> =
-            transposed.transpose().to_col_major().map_err(|e| failed(format!("{e:?}")))?;
-        matrix.sp_lu().map_err(|e| failed(format!("{e:?}")))
-    }
-}
-
-/// The factor `L` of the permuted matrix.
-struct Cholesky {
-    symbolic: faer::sparse::linalg::cholesky::SymbolicCholesky<usize>,
-    values: Vec<f64>,
-}
-
-impl Cholesky {
-    fn new(sparse: &Sparse) -> Result<Self, SolveError> {
-        let n = sparse.size();
-        let failed =
-            |e: &dyn std::fmt::Debug| SolveError::Factorisation { unknowns: n, reason: format!("{e:?}") };
-        let pattern = SymbolicSparseColMatRef::new_checked(n, n, &sparse.starts, None, &sparse.rows);
-        let matrix = SparseColMatRef::new(pattern, &sparse.values[..]);
-        let params = CholeskySymbolicParams::default();
-        let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, SymmetricOrdering::Amd, params)
-            .map_err(|e| failed(&e))?;
-        let mut values = Vec::new();
-        values.try_reserve_exact(symbolic.len_val()).map_err(|e| failed(&e))?;
-        values.resize(symbolic.len_val(), 0.0);
-        let need = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
-        let mut memory = MemBuffer::try_new(need).map_err(|e| failed(&e))?;
-        let stack = MemStack::new(&mut memory);
-        symbolic
-            .factorize_numeric_llt(
-                &mut values,
-                matrix,
-                Side::Lower,
-                Default::default(),
-                Par::Seq,
-                stack,
-                Default::default(),
-            )
-            .map_err(|LltError::NonPositivePivot { index }| SolveError::NotPositive {
-                solver: Solver::Direct,
-                iteration: index,
-            })?;
-        Ok(Self { symbolic, values })
-    }
-
-    /// Overwrites the right-hand side with the solution.
-    fn solve(&self, unknowns: &mut [f64]) {
-        let n = unknowns.len();
-        let mut memory = MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
-        LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(unknowns, n, 1),
-            Par::Seq,
-            MemStack::new(&mut memory),
-        );
+            self.columns().transpose().to_col_major().map_err(|error| self.failed(error))?;
+        matrix.sp_lu().map_err(|error| self.failed(error))
     }
 }

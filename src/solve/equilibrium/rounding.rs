@@ -18,7 +18,7 @@ const ASKED: f64 = 1e-4;
 const ENOUGH: f64 = 1e-2;
 
 /// Relative L2 error that the displacements are estimated to have; `None` where the residual is more than
-/// rounding leaves. `right` is the right-hand side that the solver may have used up.
+/// rounding leaves.
 pub(super) fn known_to(
     prepared: &mut Prepared,
     system: &System,

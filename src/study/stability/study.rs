@@ -34,6 +34,22 @@ impl Threshold {
         self.predicted.as_ref().is_none_or(|predicted| predicted.converged)
     }
 
+    /// The parameter, and on which side.
+    pub fn name(&self) -> String {
+        format!("{} ({})", self.parameter.name(), self.side.name())
+    }
+
+    /// What there is to say of how runs and spectrum agree; empty where they do.
+    pub fn verdict(&self) -> String {
+        let settled = self.found.as_ref().is_none_or(|found| found.settled);
+        match (self.agrees(), settled) {
+            _ if !self.is_predicted_well() => "a spectrum on the way did not settle".into(),
+            (false, _) => format!("THEY DISAGREE by more than {:.1e}", self.tolerance),
+            (true, false) => format!("too slow to settle: known to {:.1e}", self.tolerance),
+            (true, true) => String::new(),
+        }
+    }
+
     /// Whether runs and spectrum say the same.
     pub fn agrees(&self) -> bool {
         match (&self.predicted, &self.found) {
@@ -279,21 +295,16 @@ impl fmt::Display for Linear {
         }
         writeln!(f, "{:26} {:>14} {:>14} {:>10}", "grows beyond", "predicted", "found by runs", "apart")?;
         for threshold in &self.thresholds {
-            let name = format!("{} ({})", threshold.parameter.name(), threshold.side.name());
             let [predicted, found] = [
                 threshold.predicted.as_ref().map(|p| p.value),
                 threshold.found.as_ref().map(|found| found.value),
             ];
             let shown = |value: Option<f64>| value.map_or("nowhere".into(), |v| format!("{v:.8}"));
             let apart = predicted.zip(found).map_or(String::new(), |(p, f)| format!("{:.1e}", (p - f).abs()));
-            let settled = threshold.found.as_ref().is_none_or(|found| found.settled);
-            let verdict = match (threshold.agrees(), settled) {
-                _ if !threshold.is_predicted_well() => "  a spectrum on the way did not settle".into(),
-                (false, _) => format!("  THEY DISAGREE by more than {:.1e}", threshold.tolerance),
-                (true, false) => format!("  too slow to settle: known to {:.1e}", threshold.tolerance),
-                (true, true) => String::new(),
-            };
-            writeln!(f, "{name:26} {:>14} {:>14} {apart:>10}{verdict}", shown(predicted), shown(found))?;
+            let (name, verdict) = (threshold.name(), threshold.verdict());
+            let row =
+                format!("{name:26} {:>14} {:>14} {apart:>10}  {verdict}", shown(predicted), shown(found));
+            writeln!(f, "{}", row.trim_end())?;
         }
         writeln!(
             f,

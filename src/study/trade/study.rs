@@ -14,7 +14,7 @@ use crate::flock::role::Role;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::text::counted;
 use crate::scene::{Scene, SceneError};
-use crate::solve::stopwatch::Stopwatch;
+use crate::solve::stopwatch::{Stopwatch, median};
 use crate::study::compare::reference::{Effort, Reference};
 use crate::study::compare::run::{
     SceneReference, plan_led_by, plan_of_layout_led_by, reference_of, require_comparable,
@@ -33,6 +33,17 @@ pub enum Outcome {
         /// The message that refused it.
         reason: String,
     },
+}
+
+impl Outcome {
+    /// Its name, and the reason of a refusal, which is empty otherwise.
+    pub(crate) fn words(&self) -> (&'static str, &str) {
+        match self {
+            Self::Settled => ("settled", ""),
+            Self::Unsettled => ("unsettled", ""),
+            Self::Refused { reason } => ("refused", reason),
+        }
+    }
 }
 
 /// A setting with what it costs and how far it is from the truth.
@@ -210,14 +221,13 @@ fn measure(scene: &Scene, truth: &Reference, setting: Setting, particles: usize,
             }
         }
     }
-    seconds.sort_by(f64::total_cmp);
     let solved = last.as_ref().and_then(|outcome| outcome.solved.as_ref());
     let converged = solved.is_some_and(|solved| solved.converged);
     Point {
         setting,
         particles,
         error: last.as_ref().and_then(|outcome| error_of(outcome, truth)),
-        seconds: Some(seconds[seconds.len() / 2]),
+        seconds: Some(median(&mut seconds)),
         iterations: solved.map(|solved| solved.iterations),
         outcome: if converged { Outcome::Settled } else { Outcome::Unsettled },
     }

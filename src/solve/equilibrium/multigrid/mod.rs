@@ -34,11 +34,12 @@ use super::conjugate_gradients::{Preconditioner, iterate, iterate_single, single
 use super::steps::{for_groups, for_own_groups, side_by_side};
 use super::system::Prepared;
 use super::{Found, Precision, Request, SolveError, Solver, lanczos, steps};
+use crate::flock::halo::Halo;
 use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
 use crate::solve::field::{Real, dot};
 use crate::solve::operator::{Matrix, RowCoefficients};
-use crate::solve::part::{Halo, Part};
+use crate::solve::part::{Part, receive};
 use crate::solve::stopwatch::Stopwatch;
 
 /// Lanczos steps for the largest eigenvalue of each level, and what its estimate is raised by.
@@ -109,7 +110,7 @@ impl Transfers {
         let read_down = |rank: usize| transfer.restricted_from(levels, &coarse.groups_of(rank));
         let read_up = |rank: usize| transfer.prolonged_from(levels, &fine.groups_of(rank));
         let rank = team.rank();
-        let (down, up) = (Halo::new(rank, fine, read_down), Halo::new(rank, coarse, read_up));
+        let (down, up) = (fine.halo(rank, read_down), coarse.halo(rank, read_up));
         Self { team, down: down.here(levels.0.first()), up: up.here(levels.1.first()) }
     }
 }
@@ -235,13 +236,13 @@ fn descend(
     matrix.receive(v);
     steps::residual_of_groups(matrix, stencils, (v, f), u);
     if let Some(Transfers { team, down, .. }) = &next.transfers {
-        down.receive(team, u);
+        receive(down, team, u);
     }
     let levels = (matrix, &*next.matrix);
     next.transfer.restrict(levels, &next.outliers, u, &mut next.vectors.f);
     descend(&next.matrix, &mut next.vectors, (smoothers, further), coarsest);
     if let Some(Transfers { team, up, .. }) = &next.transfers {
-        up.receive(team, &mut next.vectors.v);
+        receive(up, team, &mut next.vectors.v);
     }
     next.transfer.prolong(levels, &next.outliers, &next.vectors.v, v);
     matrix.receive(v);
