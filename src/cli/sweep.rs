@@ -191,6 +191,11 @@ impl Sweep {
             let (name, ends) = (&self.scene.name, self.ends());
             say(&format!("{name}: {ends}, {seconds:.2} s\nresults in {}\n", kept.display()))?;
         }
+        let cautioned = self.rows.values().filter(|row| !row.cautions.is_empty()).count();
+        if cautioned > 0 {
+            let runs = counted(cautioned, "run");
+            note!("caution: {runs} of {}: see the column `cautions`", self.rows.len());
+        }
         let is_refused = self.rows.values().any(|row| row.stop_reason == runs::REFUSED);
         Ok(exit_code(!is_refused))
     }

@@ -18,9 +18,10 @@ use crate::geometry::point::{area, dot};
 use crate::geometry::shape::is_in_polygon;
 use crate::material::cells::{Cells, Incidence};
 use crate::material::elastic::Elastic;
-use crate::material::free_edge::Edge;
+use crate::material::free_edge::{Edge, FEWEST_LOADED};
 use crate::material::recovery::{CellStress, FEWEST_CELLS, Fields, KnownTraction, REACH, stress_at};
 use crate::material::stress::{self, StressState};
+use crate::scene::text::counted;
 
 /// Steps of a line of sight \[spacings\].
 const SIGHT: f64 = 0.25;
@@ -308,12 +309,15 @@ pub(super) fn cautions(
     count: impl Fn(usize) -> usize,
 ) -> Vec<String> {
     let Some(edge) = edge else {
-        let outlined = body.outline.is_some();
-        return Vec::from_iter(outlined.then(|| {
-            "the outline has too many sides and pieces for stress to be recovered along it: there it is the mean of a \
-             particle's cells, half a cell within the body"
-                .to_owned()
-        }));
+        let why = match body.outline {
+            Some(_) => "the outline has too many sides and pieces for stress to be recovered along it",
+            None => {
+                "stress is not recovered along the edges of a body of whole cells (body.outline = \"fitted\" has it)"
+            }
+        };
+        return vec![format!(
+            "{why}: there it is the mean of a particle's cells, half a cell within the body"
+        )];
     };
     let patches = Patches::new(edge, body, cells);
     let owned = body.owned();
@@ -336,6 +340,13 @@ pub(super) fn cautions(
     let [hollow, steep] = [false, true].map(in_hollows);
     let (interface, few) = (left_out(LeftOut::Interface), left_out(LeftOut::Few));
     let mut cautions = Vec::new();
+    if edge.narrow > 0 {
+        cautions.push(format!(
+            "stress beside {} on less than {FEWEST_LOADED:.0} spacings of an edge is much too low, as of wider ones; use a \
+             smaller spacing",
+            counted(edge.narrow, "load")
+        ));
+    }
     if interface > 0 {
         cautions.push(format!(
             "stress is not recovered at {interface} particles of the outline where materials meet: it has no single value \

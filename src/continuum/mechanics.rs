@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::edge_stress::{self, recovered};
 use super::pieces::CellNumbers;
+use super::run::growth;
 use crate::engine::Engine;
 use crate::engine::forces::{Forces, LoadResultant, Reaction};
 use crate::engine::path::{Path, Work};
@@ -257,7 +258,9 @@ impl Mechanics {
         let mut cautions = Vec::new();
         let is_material = matches!(engine.flock().rule.mean, Mean::Material { .. });
         let is_strained = self.largest_strain > SMALL_STRAIN;
+        let growth = growth(engine).filter(|_| is_material && is_strained);
         match rotation(engine) {
+            _ if growth.is_some() => {}
             Rotation::Small if is_material && (is_strained || self.largest_turn > SMALL_TURN) => {
                 cautions.push(format!(
                     "strains of up to {} and turns of up to {:.0} degrees under rotation = \"small\", which is right \
@@ -274,6 +277,9 @@ impl Mechanics {
             )),
             _ => {}
         }
+        cautions.extend(
+            growth.map(|cause| format!("the sweep grows from step to step, and ends nowhere: {cause}")),
+        );
         cautions.extend(self.missed_work(engine));
         if let Some((cells, elastic)) = engine.cells().zip(engine.elastic()).filter(|_| is_material) {
             cautions.extend(edge_stress::cautions(

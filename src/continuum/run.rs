@@ -331,16 +331,29 @@ fn cause_in_sweep(engine: &Engine) -> Option<String> {
     are_of_both_signs.then(|| "weights of both signs; give weights that are not negative".into())
 }
 
+/// Why a sweep grows that has not diverged yet: its moves turn back, each farther than the last. `None` of others.
+pub(super) fn growth(engine: &Engine) -> Option<String> {
+    let [along, next, last] = moves(engine);
+    (along < 0.0 && next > last).then(|| cause_in_sweep(engine)).flatten()
+}
+
 /// Whether the followers' next moves go against their last ones: waves that grow from step to step change their sign at
 /// each, and outweigh all else in the end.
 fn overshoots(engine: &Engine) -> bool {
-    let (present, previous) = (engine.present(), engine.previous());
+    moves(engine)[0] < 0.0
+}
+
+/// Products of the followers' next moves with their last ones, with themselves, and of the last with themselves, in sum.
+fn moves(engine: &Engine) -> [f64; 3] {
+    let (present, previous, damping) = (engine.present(), engine.previous(), engine.update().damping);
     let followers = engine.body().owned().filter(|&i| engine.roles()[i] == Role::Follower);
-    let along = |i: usize| {
+    let products = |i: usize| {
         let here = present.get(i);
-        [dot(minus(engine.flock().target(i, present), here), minus(here, previous.get(i)))]
+        let next = minus(engine.flock().target(i, present), here).map(|x| damping * x);
+        let last = minus(here, previous.get(i));
+        [dot(next, last), dot(next, next), dot(last, last)]
     };
-    engine.sum_over([0.0], followers.map(|i| (i, along(i))))[0] < 0.0
+    engine.sum_over([0.0; 3], followers.map(|i| (i, products(i))))
 }
 
 #[cfg(test)]

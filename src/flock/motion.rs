@@ -70,6 +70,16 @@ pub enum Interpolation {
 }
 
 impl Motion {
+    /// Whether it leads every particle along this axis, 0 or 1, at some time, as far as that is the same for all.
+    pub fn goes_along(&self, axis: usize) -> bool {
+        match self {
+            Self::Velocity { per_step } => per_step[axis] != 0.0,
+            Self::Keyframes { frames, .. } => frames.iter().any(|frame| frame.displacement[axis] != 0.0),
+            Self::Sinusoid { amplitude, .. } => amplitude[axis] != 0.0,
+            Self::Affine { .. } | Self::Table { .. } => false,
+        }
+    }
+
     /// Displacement after `step` steps of the leader number `which`, which started from `base` \[length\].
     pub fn displacement(&self, step: f64, which: usize, base: [f64; 2]) -> [f64; 2] {
         match self {

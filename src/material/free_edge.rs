@@ -48,7 +48,12 @@ pub struct Edge {
     pub particles: Vec<usize>,
     /// On all of the body under the whole load \[force / length^3\].
     pub body_force: [f64; 2],
+    /// Loads that begin and end on sides, with less than [`FEWEST_LOADED`] spacings between.
+    pub narrow: usize,
 }
+
+/// Spacings of an edge under a load from which its stress is seen \[1\].
+pub const FEWEST_LOADED: f64 = 4.0;
 
 impl FreeEdge {
     /// The outline with how many sides the boundary of the whole body has, where this is of a part of one. `loads` act on the outline of a sheet of this `thickness` \[length\]; `held` names the components of each
@@ -98,7 +103,9 @@ impl FreeEdge {
                 particles.iter().for_each(|&i| is_pushed[i as usize] = true);
             }
         }
-        let mut edge = Edge { body_force: self.body_force(), ..Edge::default() };
+        let spacing = body.lattice.spacing();
+        let narrow = loads.iter().filter(|load| load.is_narrow(outline, FEWEST_LOADED * spacing)).count();
+        let mut edge = Edge { body_force: self.body_force(), narrow, ..Edge::default() };
         let finder = Finder::new(outline);
         let exact = body.exact();
         // Where a part ends is no outline.

@@ -117,6 +117,14 @@ impl OutlineLoad {
         }
     }
 
+    /// Whether it acts on less than this length \[length\], and not on whole pieces of the outline: under a load from corner to corner
+    /// stress does not change so soon.
+    pub(super) fn is_narrow(&self, outline: &Outline, least: f64) -> bool {
+        let length = |at: &Portion| (at.t[1] - at.t[0]).abs() * outline.piece(at.ring, at.piece).length();
+        let is_part = self.portions.iter().any(|at| at.t != [0.0, 1.0]);
+        is_part && self.portions.iter().map(length).sum::<f64>() < least
+    }
+
     /// Forces \[force\] at places \[length\] that stand for the load: Gauss points of stretches that end at `breaks`
     /// and are no longer than `grain` \[length\].
     fn forces(&self, outline: &Outline, breaks: &[Place], grain: f64) -> Vec<([f64; 2], [f64; 2])> {

@@ -315,6 +315,55 @@ fn components_that_would_be_held_later_or_not_at_all_are_refused_by_name() {
 }
 
 #[test]
+fn a_motion_that_goes_where_nothing_is_led_is_refused() {
+    let led = |motion: &str| {
+        format!(
+            "[[roles]]\nregion = {{ kind = \"edge\", side = \"right\" }}\nrole = \"leader\"\naxis = \"x\"\nmotion = {{ {motion} }}\n[stop]\nsteps = 2\n"
+        )
+    };
+    for motion in [
+        "kind = \"velocity\", per_step = [0.01, 0.5]",
+        "kind = \"sinusoid\", amplitude = [0.0, 0.1], period = 8",
+        "kind = \"keyframes\", frames = [{ step = 1, displacement = [0.1, 0.0] }, { step = 2, displacement = [0.1, 0.1] }]",
+    ] {
+        let (_, said) = run(&[BAR, &led(motion)], &["--figures", "none"], 2);
+        assert!(
+            said.contains("roles[1].motion") && said.contains("axis = \"x\" leads along x alone"),
+            "{said}"
+        );
+    }
+    run(&[BAR, &led("kind = \"velocity\", per_step = [0.01, 0.0]")], &["--figures", "none"], 0);
+}
+
+#[test]
+fn stress_that_is_not_recovered_or_too_low_under_a_load_is_a_caution() {
+    let figures = ["--figures", "none"];
+    let caution = |more: &[&str], parts: &[&str], words: &str| {
+        let (_, said) = run(parts, &[&figures[..], more].concat(), 0);
+        said.contains(words)
+    };
+    let cells = "stress is not recovered along the edges of a body of whole cells";
+    let lattice = ["--set", "body.outline=lattice"];
+    assert!(caution(&lattice, &[BAR, PULL, SOLVED], cells) && !caution(&[], &[BAR, PULL, SOLVED], cells));
+    let on = |from: f64, to: f64| {
+        let region = format!("{{ kind = \"outline\", between = [[{from}, 2.0], [{to}, 2.0]] }}");
+        format!("[[loads]]\nkind = \"pressure\"\nregion = {region}\npressure = 1e3\n")
+    };
+    let narrow = "1 load on less than 4 spacings";
+    for (from, to, is_narrow) in [(2.0, 2.1, true), (1.0, 2.4, true), (1.0, 3.1, false), (0.0, 4.0, false)] {
+        assert_eq!(caution(&[], &[BAR, &on(from, to), SOLVED], narrow), is_narrow, "{from} to {to}");
+    }
+}
+
+#[test]
+fn a_sweep_that_grows_is_not_taken_for_a_body_that_turns_far() {
+    let steps = "[stop]\nsteps = 120\n[update]\ndamping = 1.0\n";
+    let (_, said) = run(&[BAR, PULL, steps], &["--figures", "none", "--set", "stop.divergence_ratio=1e9"], 0);
+    assert!(said.contains("the sweep grows from step to step") && said.contains("damping"), "{said}");
+    assert!(!said.contains("rotation = \"small\""), "{said}");
+}
+
+#[test]
 fn a_component_of_particles_that_are_held_altogether_is_led_nowhere_and_that_is_said() {
     let (bar, _) = BAR.split_once("[[roles]]").expect("has a clamp");
     let clamped = "[[roles]]\nregion = { kind = \"edge\", side = \"left\" }\nrole = \"clamped\"\n";

@@ -23,7 +23,7 @@ fn a_sweep_has_the_numbers_of_single_runs() {
     let rows = table(folder.path().join("o/sweep.csv"));
     assert_eq!(
         rows[0].join(","),
-        "run,update.damping,stop.steps,energies.pe1,steps,probe.67.ux@20,probe.67.x,stop_reason,reason"
+        "run,update.damping,stop.steps,energies.pe1,steps,probe.67.ux@20,probe.67.x,stop_reason,reason,cautions"
     );
     assert_eq!(rows.len(), 7);
     let varied: Vec<String> = rows[1..].iter().map(|row| row[1..3].join(" ")).collect();
@@ -46,6 +46,19 @@ fn a_sweep_has_the_numbers_of_single_runs() {
     assert!((number(&single[5]) - (place("20") - place("0"))).abs() < 1e-12, "{single:?}");
     assert_eq!(number(&single[6]), place("40"));
     assert!(folder.path().join("o/sweep.svg").is_file() && folder.path().join("o/sweep.png").is_file());
+}
+
+#[test]
+fn cautions_of_single_runs_are_those_of_a_sweep() {
+    let folder = temporary();
+    let vary = "lattice.spacing=[2.0,0.25]";
+    let outputs = "mechanics.largest_von_mises.von_mises";
+    let sweep = ["sweep", "plate-hole", "--vary", vary, "--outputs", outputs, "--out", "o"];
+    let said = flockform(&sweep, folder.path());
+    assert!(said.status.success() && text(&said.stderr).contains("caution: 1 run of 2"), "{said:?}");
+    let rows = table(folder.path().join("o/sweep.csv"));
+    let of = |row: usize| rows[row].last().expect("a column").as_str();
+    assert!(of(1).contains("stress is too low") && of(2).is_empty(), "{rows:?}");
 }
 
 #[test]

@@ -51,6 +51,7 @@ pub struct Runs<'a> {
 struct Ended {
     stop_reason: StopReason,
     outputs: Vec<Result<String, OutputError>>,
+    cautions: Vec<String>,
 }
 
 impl Ended {
@@ -172,26 +173,27 @@ impl Runs<'_> {
         let measured = Measured::of(&scene, &outcome).map(|(measured, _)| measured);
         let summary = Summary::new(&scene, &outcome, measured, timings);
         let values = Values { engine: &outcome.engine, summary: &summary, probed: &observer.probed };
-        Ok(Ended { outputs: values.texts(self.outputs), stop_reason: outcome.reason })
+        let outputs = values.texts(self.outputs);
+        Ok(Ended { outputs, stop_reason: outcome.reason, cautions: summary.cautions })
     }
 
     /// The row of a run; none for one that was broken off.
     fn row(&self, run: usize, ended: Result<Ended, SceneError>) -> Option<Row> {
-        let row = |stop_reason: &str, outputs: Vec<String>, reason: String| {
-            Some(Row { run, stop_reason: stop_reason.to_owned(), outputs, reason })
+        let row = |stop_reason: &str, outputs: Vec<String>, reason: String, cautions: Vec<String>| {
+            Some(Row { run, stop_reason: stop_reason.to_owned(), outputs, reason, cautions })
         };
         match ended {
             Ok(Ended { stop_reason: StopReason::Interrupted, .. }) => None,
-            Ok(Ended { stop_reason, outputs }) => {
+            Ok(Ended { stop_reason, outputs, cautions }) => {
                 let outputs = outputs.into_iter().map(Result::unwrap_or_default).collect();
-                row(stop_reason.name(), outputs, stop_reason.fault().unwrap_or_default())
+                row(stop_reason.name(), outputs, stop_reason.fault().unwrap_or_default(), cautions)
             }
             // A solve that was broken off has an error as well.
             Err(_) if interrupt::is_raised() => None,
             Err(error) => {
                 let words = error.to_string();
                 let reason = words.lines().next().unwrap_or_default().to_owned();
-                row(REFUSED, vec![String::new(); self.outputs.len()], reason)
+                row(REFUSED, vec![String::new(); self.outputs.len()], reason, Vec::new())
             }
         }
     }

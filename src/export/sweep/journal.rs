@@ -114,6 +114,9 @@ pub struct Row {
     pub outputs: Vec<String>,
     /// The cause of a refusal or a divergence.
     pub reason: String,
+    /// What its summary cautions against.
+    #[serde(default)]
+    pub cautions: Vec<String>,
 }
 
 /// Error reading a sweep that has begun.
@@ -305,7 +308,13 @@ mod tests {
 
     fn row(run: usize) -> Row {
         let outputs = vec!["0.1".into(), String::new()];
-        Row { run, stop_reason: "steps".into(), outputs, reason: "a\nline".into() }
+        Row {
+            run,
+            stop_reason: "steps".into(),
+            outputs,
+            reason: "a\nline".into(),
+            cautions: vec!["so".into()],
+        }
     }
 
     #[test]

@@ -38,18 +38,18 @@ pub struct Table<'a> {
 }
 
 impl Table<'_> {
-    /// Names of the columns: the run, the varied keys, the outputs, how it ended.
+    /// Names of the columns: the run, the varied keys, the outputs, how it ended, and what its summary cautions against.
     pub fn head(&self) -> Vec<&str> {
         let keys = self.design.factors.iter().map(|factor| factor.key.as_str());
         let outputs = self.outputs.iter().map(String::as_str);
-        ["run"].into_iter().chain(keys).chain(outputs).chain(["stop_reason", "reason"]).collect()
+        ["run"].into_iter().chain(keys).chain(outputs).chain(["stop_reason", "reason", "cautions"]).collect()
     }
 
     /// The cells of each run, in the order of their numbers.
     pub fn cells(&self) -> impl Iterator<Item = Vec<String>> {
         self.rows.values().map(|row| {
             let values = self.design.runs[row.run].iter().map(|level| level.text.clone());
-            let ended = [row.stop_reason.clone(), row.reason.clone()];
+            let ended = [row.stop_reason.clone(), row.reason.clone(), row.cautions.join("; ")];
             [row.run.to_string()].into_iter().chain(values).chain(row.outputs.clone()).chain(ended).collect()
         })
     }

@@ -36,8 +36,18 @@ pub fn role_entry(
     }
     let when = raw.when.as_ref().map(|when| condition(key, when, refuse)).transpose()?;
     let motion = raw.motion.as_ref().map(|motion| leader_motion(key, motion, folder, refuse)).transpose()?;
+    let axis = raw.axis.map(Axis::from);
+    let (led, other, across) = if axis == Some(Axis::Y) { ("y", "x", 0) } else { ("x", "y", 1) };
+    if let (Some(_), Some(LeaderMotion::Program(motion))) = (axis, &motion)
+        && motion.goes_along(across)
+    {
+        let message =
+            format!("axis = \"{led}\" leads along {led} alone, and the motion goes along {other} too");
+        let help = "make the other component of the motion zero, or leave `axis` out";
+        return Err(refuse(&format!("{key}.motion"), message, help));
+    }
     let region = region(key, &raw.region, refuse)?;
-    Ok(RoleEntry { region, role, axis: raw.axis.map(Axis::from), from: raw.from.max(1), when, motion })
+    Ok(RoleEntry { region, role, axis, from: raw.from.max(1), when, motion })
 }
 
 pub fn region(key: &str, raw: &RawRegion, refuse: Refuse<'_>) -> Result<SceneRegion, SceneError> {
