@@ -193,8 +193,8 @@ impl Sweep {
         }
         let cautioned = self.rows.values().filter(|row| !row.cautions.is_empty()).count();
         if cautioned > 0 {
-            let runs = counted(cautioned, "run");
-            note!("caution: {runs} of {}: see the column `cautions`", self.rows.len());
+            let all = counted(self.rows.len(), "run");
+            note!("caution: {cautioned} of {all} with cautions of their own: see the column `cautions`");
         }
         let is_refused = self.rows.values().any(|row| row.stop_reason == runs::REFUSED);
         Ok(exit_code(!is_refused))

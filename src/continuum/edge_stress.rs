@@ -309,15 +309,12 @@ pub(super) fn cautions(
     count: impl Fn(usize) -> usize,
 ) -> Vec<String> {
     let Some(edge) = edge else {
-        let why = match body.outline {
-            Some(_) => "the outline has too many sides and pieces for stress to be recovered along it",
-            None => {
-                "stress is not recovered along the edges of a body of whole cells (body.outline = \"fitted\" has it)"
-            }
-        };
-        return vec![format!(
-            "{why}: there it is the mean of a particle's cells, half a cell within the body"
-        )];
+        let outlined = body.outline.is_some();
+        return Vec::from_iter(outlined.then(|| {
+            "the outline has too many sides and pieces for stress to be recovered along it: there it is the mean of a \
+             particle's cells, half a cell within the body"
+                .to_owned()
+        }));
     };
     let patches = Patches::new(edge, body, cells);
     let owned = body.owned();
@@ -342,7 +339,7 @@ pub(super) fn cautions(
     let mut cautions = Vec::new();
     if edge.narrow > 0 {
         cautions.push(format!(
-            "stress beside {} on less than {FEWEST_LOADED:.0} spacings of an edge is much too low, as of wider ones; use a \
+            "{} on less than {FEWEST_LOADED:.0} spacings of an edge: stress is much too low there, as under a wider one; use a \
              smaller spacing",
             counted(edge.narrow, "load")
         ));

@@ -258,9 +258,12 @@ impl Mechanics {
         let mut cautions = Vec::new();
         let is_material = matches!(engine.flock().rule.mean, Mean::Material { .. });
         let is_strained = self.largest_strain > SMALL_STRAIN;
-        let growth = growth(engine).filter(|_| is_material && is_strained);
+        let growth = (is_material && is_strained).then(|| growth(engine)).flatten();
         match rotation(engine) {
-            _ if growth.is_some() => {}
+            _ if growth.is_some() => cautions.extend(growth.map(|cause| {
+                let strain = percent(self.largest_strain);
+                format!("strains of up to {strain}, and the sweep grows from step to step: {cause}")
+            })),
             Rotation::Small if is_material && (is_strained || self.largest_turn > SMALL_TURN) => {
                 cautions.push(format!(
                     "strains of up to {} and turns of up to {:.0} degrees under rotation = \"small\", which is right \
@@ -277,9 +280,6 @@ impl Mechanics {
             )),
             _ => {}
         }
-        cautions.extend(
-            growth.map(|cause| format!("the sweep grows from step to step, and ends nowhere: {cause}")),
-        );
         cautions.extend(self.missed_work(engine));
         if let Some((cells, elastic)) = engine.cells().zip(engine.elastic()).filter(|_| is_material) {
             cautions.extend(edge_stress::cautions(

@@ -20,7 +20,7 @@ use crate::flock::role::Role;
 use crate::flock::rules::{FeedbackReference, Mean, Rotation};
 use crate::geometry::point::area;
 use crate::material::outline_loads::Resultant;
-use crate::scene::raw::RawLoad;
+use crate::scene::raw::{RawLoad, RawShape};
 use crate::scene::text::counted;
 use crate::scene::{LoadSteps, Scene, SceneError, Weights as SceneWeights};
 use crate::sweep::{Order, Sweep};
@@ -287,6 +287,7 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
     }
     cautions.extend(bulk_response::cautions(scene));
     cautions.extend(dead_pressure(scene));
+    cautions.extend(whole_cells(scene));
     cautions.extend(uneven_sides(scene));
     cautions.extend(late::cautions(scene));
     cautions.extend(doubts::planned(scene, &plan.setup));
@@ -313,6 +314,17 @@ pub(crate) fn dead_pressure(scene: &Scene) -> Option<String> {
     (presses && scene.rotation() == Rotation::Corotated).then(|| {
         "pressure acts along the normals of the undeformed outline, on its undeformed length: it does not follow a body \
          that turns"
+            .to_owned()
+    })
+}
+
+/// The warning about stress along edges that could follow the outline and do not, if there is one.
+pub(crate) fn whole_cells(scene: &Scene) -> Option<String> {
+    let has_outline = !matches!(scene.raw.body.shape, RawShape::Grid { .. } | RawShape::Points { .. });
+    let is_material = matches!(scene.mean, Mean::Material { .. });
+    (has_outline && is_material && !scene.is_fitted).then(|| {
+        "stress is not recovered along the edges of a body of whole cells: there it is the mean of a particle's cells, half a \
+         cell within the body; leave body.outline out"
             .to_owned()
     })
 }

@@ -333,8 +333,10 @@ fn cause_in_sweep(engine: &Engine) -> Option<String> {
 
 /// Why a sweep grows that has not diverged yet: its moves turn back, each farther than the last. `None` of others.
 pub(super) fn growth(engine: &Engine) -> Option<String> {
+    /// Of the squares of the moves, from one to the next \[1\].
+    const GROWS: f64 = 1.01;
     let [along, next, last] = moves(engine);
-    (along < 0.0 && next > last).then(|| cause_in_sweep(engine)).flatten()
+    (along < 0.0 && next > GROWS * last).then(|| cause_in_sweep(engine)).flatten()
 }
 
 /// Whether the followers' next moves go against their last ones: waves that grow from step to step change their sign at

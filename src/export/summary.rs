@@ -15,7 +15,7 @@ use crate::continuum::late;
 use crate::continuum::layout::regions::uneven_sides;
 use crate::continuum::mechanics::{Mechanics, Peak, Stresses, percent};
 use crate::continuum::places::{AtPlace, at_places};
-use crate::continuum::report::dead_pressure;
+use crate::continuum::report::{dead_pressure, whole_cells};
 use crate::continuum::run::{Outcome, StopReason};
 use crate::engine::Engine;
 use crate::engine::forces::Reaction;
@@ -290,7 +290,11 @@ impl Summary {
 
 fn cautions(scene: &Scene, engine: &Engine, measured: Option<&Measured>) -> Vec<String> {
     let of_forces = |measured: &Measured| {
-        dead_pressure(scene).into_iter().chain(measured.mechanics.cautions(engine)).collect::<Vec<_>>()
+        dead_pressure(scene)
+            .into_iter()
+            .chain(whole_cells(scene))
+            .chain(measured.mechanics.cautions(engine))
+            .collect::<Vec<_>>()
     };
     uneven_sides(scene)
         .into_iter()

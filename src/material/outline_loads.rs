@@ -121,7 +121,9 @@ impl OutlineLoad {
     /// stress does not change so soon.
     pub(super) fn is_narrow(&self, outline: &Outline, least: f64) -> bool {
         let length = |at: &Portion| (at.t[1] - at.t[0]).abs() * outline.piece(at.ring, at.piece).length();
-        let is_part = self.portions.iter().any(|at| at.t != [0.0, 1.0]);
+        /// Of a piece, to rounding \[1\].
+        const END: f64 = 1e-9;
+        let is_part = self.portions.iter().any(|at| at.t[0] > END || at.t[1] < 1.0 - END);
         is_part && self.portions.iter().map(length).sum::<f64>() < least
     }
 

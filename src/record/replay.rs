@@ -354,8 +354,7 @@ impl Replay {
         self.begun = false;
     }
 
-    /// Settings given at the start give way to those changed since the flight; those changed during it
-    /// is changed again.
+    /// Settings given at the start give way to those changed since the flight; what was changed during it is changed again.
     fn parameter(&mut self, name: &str, value: f64) {
         let of = |all: &[(&str, f64)]| all.iter().find(|(one, _)| *one == name).map(|(_, value)| *value);
         let (then, today) = (of(&self.as_recorded), of(&parameters(&self.fresh)));

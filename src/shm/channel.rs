@@ -263,7 +263,7 @@ impl<T: Payload> Writer<T> {
         Self::open_for(peer, space, leaf, capacity, most, None)
     }
 
-    /// As [`Writer::open`]; of several that share a service, each for one member alone.
+    /// As [`Writer::open`]; of several that share a service, each for this one member alone, or for all.
     pub(super) fn open_for(
         peer: &Peer,
         space: &str,

@@ -132,7 +132,7 @@ fn messages() -> impl Strategy<Value = Vec<(usize, Vec<Damage>)>> {
 fn messages_with_anything_in_them_are_replayed_or_refused() {
     let reader = Reader::of_bytes(Path::new("good.mcap"), good().to_vec()).expect("readable");
     let mut entries: Vec<Entry> = Vec::new();
-    reader.each(&mut |entry| entries.push(entry.clone()));
+    assert_eq!(reader.each(&mut |entry| entries.push(entry.clone())), None);
     let folder = temporary();
     fuzz(&messages(), |messages| {
         let path = folder.path().join("messages.mcap");

@@ -113,50 +113,6 @@ fn robots_of_any_pace_keep_clear_behind_late_poses_and_commands() {
     assert!(met[0] < 0.12 && met[1] < 0.5, "they met: {met:?}");
 }
 
-/// Where a robot is seen farther back than before, its room seems to end before its last target.
-#[test]
-fn targets_do_not_leap_back_where_the_ages_of_poses_vary() {
-    let mut largest = [0.0_f64; 2];
-    for seed in 0..40_u64 {
-        let mut random = Pcg64Mcg::seed_from_u64(seed);
-        let alone = seed as usize % 2;
-        let mut controls = loops(&circle("integrator\""), alone == 1);
-        let places = controls[0].formation().places.clone();
-        for k in 0..ROBOTS {
-            let goal = places.get(k).map(|x| -x + random.random_range(-0.5..0.5));
-            controls.iter_mut().for_each(|control| assert!(control.place_leader(k, goal)));
-        }
-        let mut poses = vec![places; 1];
-        let mut before: Vec<Option<[f64; 2]>> = vec![None; ROBOTS];
-        for tick in 0_usize..200 {
-            let now = tick as f64 * PERIOD;
-            for k in 0..ROBOTS {
-                let old = tick.saturating_sub(random.random_range(0..3));
-                let stamp = old as f64 * PERIOD;
-                let pose = Pose { position: poses[old].get(k), yaw: 0.0, stamp, frame_is_right: true };
-                controls.iter_mut().for_each(|control| control.receive(k, pose, now).unwrap_or(()));
-            }
-            controls.iter_mut().for_each(|control| control.tick(now));
-            let mut next = poses[tick].clone();
-            for (k, before) in before.iter_mut().enumerate() {
-                let Some(target) = controls[k.min(controls.len() - 1)].target(k) else { continue };
-                let leap = before.replace(target).map_or(0.0, |before| distance(before, target));
-                largest[alone] = largest[alone].max(leap);
-                let (here, way) = (next.get(k), distance(next.get(k), target));
-                let share = if way > 0.0 { (PERIOD / way).min(1.0) } else { 0.0 };
-                next.set(k, [0, 1].map(|axis| here[axis] + share * (target[axis] - here[axis])));
-            }
-            for (a, b) in (0..ROBOTS).flat_map(|a| (0..a).map(move |b| (a, b))) {
-                let gap = distance(next.get(a), next.get(b)) - 0.3;
-                assert!(gap >= 0.1 - 1e-9, "seed {seed}, tick {tick}: r{a} and r{b} {gap} m apart");
-            }
-            poses.push(next);
-        }
-    }
-    println!("{largest:?}");
-    assert!(largest[0] < 1.5 * PERIOD && largest[1] < 2.0 * PERIOD, "{largest:?} m");
-}
-
 /// Discs that grow with the ages of poses filled the gap, and the robots stood before it, or wandered.
 #[test]
 fn swarms_with_late_poses_fly_as_others_do() {

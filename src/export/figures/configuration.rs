@@ -69,6 +69,8 @@ pub fn configuration(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
 #[derive(Clone, Debug, Default)]
 pub struct Setting {
     bounds: Option<Bounds>,
+    /// Of the body in its reference places: one that bends is no wider.
+    at_rest: Option<Bounds>,
     /// Lowest and highest value of the field; none of frame and ghosts, which are no matter.
     range: Option<[f64; 2]>,
     roles: Vec<Role>,
@@ -95,7 +97,9 @@ impl Setting {
     fn is_wide(&self, axes: &Axes) -> bool {
         /// \[px\]
         const LEAST: f64 = 2.0;
-        self.bounds.is_none_or(|[low, high]| (0..2).all(|k| (high[k] - low[k]) * axes.scale() >= LEAST))
+        let all = [self.bounds, self.at_rest].into_iter().flatten();
+        all.flat_map(|[low, high]| [0, 1].map(|k| high[k] - low[k]))
+            .all(|width| width * axes.scale() >= LEAST)
     }
 
     /// Makes room for this configuration, and for these values of its particles, shape \[count\].
@@ -103,6 +107,7 @@ impl Setting {
         let owned = subject.body.owned();
         let within = subject.bounds(page::bounds(&snapshot.positions, owned.clone()));
         self.bounds = page::around_both(self.bounds, within);
+        self.at_rest = subject.bounds(page::bounds(&subject.body.reference, owned.clone()));
         let is_here = |role: Role| f64::from(snapshot.roles[owned.clone()].contains(&role));
         let are_present = subject.largest(PAINTING_ORDER.map(is_here));
         let is_there = |role: Role| PAINTING_ORDER.into_iter().zip(are_present).any(|one| one == (role, 1.0));

@@ -79,7 +79,11 @@ struct Shown<'a> {
 }
 
 impl Shown<'_> {
+    /// As it was kept; at the end as it is.
     fn displacement(&self, frame: usize) -> Vectors {
+        if frame + 1 == self.recorder.frames().len() {
+            return self.engine.displacements();
+        }
         let tracks = &self.recorder.frames()[frame].tracks;
         Vectors { x: tracks[0].values(), y: tracks[1].values() }
     }
@@ -113,7 +117,36 @@ impl Shown<'_> {
             }
             None => format!("{} {step}", subject.counts),
         };
-        page::note_at(&clock, self.broken(frame).len())
+        let note = page::note_at(&clock, self.broken(frame).len());
+        match self.uncertain(frame) {
+            Some(strain) => format!("{note}; strains uncertain by {strain:.1e}"),
+            None => note,
+        }
+    }
+
+    /// What rounded displacements leave strains, and what is computed from them, uncertain by, where that is seen \[1\].
+    fn uncertain(&self, frame: usize) -> Option<f64> {
+        /// Part of the largest strain that is seen \[1\].
+        const SEEN: f64 = 0.02;
+        /// Particles that are asked for theirs.
+        const ASKED: usize = 1000;
+        let quantity = match self.colour {
+            FilmColour::Strain => STRAIN,
+            FilmColour::VonMises => VON_MISES,
+            FilmColour::Pe1 => PE1,
+            _ => return None,
+        };
+        let frames = self.recorder.frames();
+        if frame + 1 == frames.len() || self.recorder.keeps(quantity) {
+            return None;
+        }
+        let quantum = |axis: usize| f64::from(frames[frame].tracks[axis].exponent).exp2();
+        let strain = quantum(0).max(quantum(1)) / self.engine.body().lattice.spacing();
+        let count = self.engine.body().count();
+        let asked = (0..count).step_by(count.div_ceil(ASKED).max(1));
+        let largest =
+            asked.filter_map(|i| self.engine.strain(i)).map(|one| one.largest()).fold(0.0, f64::max);
+        (strain > SEEN * largest && largest > 0.0).then_some(strain)
     }
 
     /// Shape \[count\]; none where roles are shown.
@@ -186,5 +219,54 @@ impl Shown<'_> {
             FilmColour::VonMises => ("von Mises stress", Units::of(self.scene).stress, 0.0),
         };
         Some(Scale { quantity, unit, bands: setting.bands(noise) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use super::*;
+    use crate::continuum::equilibrium::run_to_equilibrium_watched;
+    use crate::continuum::plan::Plan;
+    use crate::engine::observer::EachStep;
+
+    /// Stretched by 1e-4 and turned by 90 degrees: strain and stress are the same everywhere.
+    #[test]
+    fn a_film_of_a_body_that_turns_far_ends_with_its_strain_and_says_how_sure_it_was_on_the_way() {
+        let text = r#"
+            title = "Steel"
+            material = { kind = "isotropic", young = 210e3, poisson = 0.0 }
+            rule = { mean = { kind = "material", rotation = "corotated" } }
+            lattice = { kind = "square", spacing = 1.0 }
+            body = { shape = { kind = "grid", columns = 501, rows = 20 } }
+            stop.steps = 2
+            [[roles]]
+            region = { kind = "all" }
+            role = "leader"
+            motion = { kind = "affine", rotate = 90.0, stretch = [1.0001, 1.0], steps = 2 }
+            "#;
+        let scene = Scene::parse("steel", "steel", text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+        let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
+        let mut recorder = None;
+        let mut see = |engine: &Engine, _: f64| {
+            RunRecorder::open(&mut recorder, &mut None, (&scene, engine)).watch(engine);
+            ControlFlow::Continue(())
+        };
+        let outcome = run_to_equilibrium_watched(&scene, plan, &mut EachStep(&mut see)).expect("an end");
+        let mut recorder = recorder.expect("it has looked");
+        recorder.close(&scene, &outcome);
+        for (colour, expected) in [(FilmColour::Strain, 1e-4), (FilmColour::VonMises, 21.0)] {
+            let shown = Shown { scene: &scene, engine: &outcome.engine, recorder: &recorder, colour };
+            let worst = |frame: usize| {
+                let values = shown.values(frame).expect("shown");
+                values.iter().map(|value| (value / expected - 1.0).abs()).fold(0.0, f64::max)
+            };
+            let last = recorder.frames().len() - 1;
+            assert!(worst(last) < 1e-8 && shown.uncertain(last).is_none(), "{colour:?}: {}", worst(last));
+            // Half way it is stretched by as much as it turns back.
+            let off = shown.uncertain(last - 1).expect("said");
+            assert!((1e-6..1e-4).contains(&off), "{off}");
+        }
     }
 }

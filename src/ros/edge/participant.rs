@@ -22,7 +22,7 @@ use super::places::Places;
 use super::pulse::{self, Pulse};
 use super::whole::WholeReplies;
 use super::{EdgeError, Publisher, Quality, Service, Subscription, farewell, names};
-use crate::messages::names::{Names, check_full_name};
+use crate::messages::names::{NameError, Names, check_full_name};
 use crate::messages::{Message, ServiceType};
 
 /// Where to take part.
@@ -152,8 +152,14 @@ impl Edge {
     /// letters, digits and underscores.
     pub fn node(&self, namespace: &str, name: &str) -> Result<Node, EdgeError> {
         let qualified = if namespace == "/" { format!("/{name}") } else { format!("{namespace}/{name}") };
+        check_full_name("node name", &qualified)?;
         let names = Names::new(name, namespace, &[])?;
-        let refused = |error| EdgeError::Endpoint { topic: qualified.clone(), reason: format!("{error:?}") };
+        let refused = |error| NameError {
+            what: "node name",
+            name: qualified.clone(),
+            reason: format!("{error:?}"),
+            help: "give another name",
+        };
         let parsed = NodeName::new(namespace, name).map_err(refused)?;
         self.shared.graph.add_node(parsed);
         Ok(Node { shared: self.shared.clone(), name: qualified, names, commands: Mutex::default() })

@@ -1,6 +1,6 @@
 //! The filter: one pass over the members, each with a cell of its own.
 
-use super::cell::{Cell, length, shortened};
+use super::cell::{Cell, HalfPlane, length, shortened};
 use super::deadlock::Detour;
 use super::limits::{Limits, SafetyError};
 use super::obstacles::Obstacles;
@@ -299,19 +299,15 @@ impl Filter {
         }
         flags.0 |= Flags::SPEED_LIMITED;
         let place = [last[0] + step[0], last[1] + step[1]];
-        if self.limits.arrives {
-            return place;
+        // One that lags behind its targets need not have the cell in which the last one was.
+        let out = minus(place, here);
+        let leaves =
+            |plane: &HalfPlane| dot(plane.normal, out) > plane.offset.max(0.0) + TOUCHING * length(out);
+        if !self.limits.arrives && self.cell.planes.iter().any(leaves) {
+            let step = shortened(minus(target, here), self.limits.speed * period);
+            return [here[0] + step[0], here[1] + step[1]];
         }
-        // One that lags behind its targets need not have the cell in which the last one was: as far beyond the limit as leads back
-        // into it.
-        let [out, within] = [place, target].map(|place| minus(place, here));
-        let back = self.cell.planes.iter().map(|plane| {
-            let most = plane.offset.max(0.0) + TOUCHING * length(out);
-            let [out, within] = [out, within].map(|way| dot(plane.normal, way));
-            if out > most { ((out - most) / (out - within)).min(1.0) } else { 0.0 }
-        });
-        let back = back.fold(0.0, f64::max);
-        [0, 1].map(|k| place[k] + back * (target[k] - place[k]))
+        place
     }
 
     /// Time for which a member has gone on to its targets since its pose, if they are known \[s\]: by so much farther from

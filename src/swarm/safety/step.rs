@@ -58,6 +58,7 @@ impl Filter {
         let way = [wanted[0] - here[0], wanted[1] - here[1]];
         if !seen.known[member] || !way.iter().all(|value| value.is_finite()) {
             self.detours[member].reset();
+            self.cell.planes.clear();
             return (here, Flags(Flags::HELD));
         }
         let brakes = self.crowd.brakes;

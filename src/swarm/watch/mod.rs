@@ -197,7 +197,8 @@ impl Member {
     fn weigh(&mut self, pose: &Pose, now: f64, limits: &WatchLimits) -> Result<(), Rejection> {
         let Some(last) = self.accepted else { return Ok(()) };
         let (far, allowed) = limits.jump(&last, pose);
-        if pose.stamp == last.stamp && far > allowed {
+        // Those that bear no stamp have that of their arrival, which several may share.
+        if pose.stamp == last.stamp && pose.stamp < now && far > allowed {
             return Err(Rejection::TwoAtOnce { distance: far });
         }
         if pose.stamp <= last.stamp {

@@ -182,6 +182,7 @@ export class Body {
       const part = this.at === this.last ? 1 : this.step / this.animation.times[this.last];
       exact.forEach((value, i) => (out[i] = part * value));
     }
+    else if (key === "strain" && this.at === this.last && this.exact.has("strain_xx")) this.strain(out);
     else if (this.frames.has(key)) this.frames.read(key, this.at, out);
     else if (key === "displacement") for (let i = 0; i < this.count; i++) out[i] = Math.hypot(this.dx[i], this.dy[i]);
     else if (key === "pe1") this.pe1(out);
