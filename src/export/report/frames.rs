@@ -125,6 +125,12 @@ impl Frames {
         self.kept.push(Frame { step, tracks });
     }
 
+    /// Whether frames are of these channels: those of another program may not be.
+    pub fn are_of_these(&self, frames: &[Frame]) -> bool {
+        let bits = || self.channels.iter().map(|channel| channel.bits);
+        frames.iter().all(|frame| frame.tracks.iter().map(|track| track.bits).eq(bits()))
+    }
+
     /// Goes on from frames that were kept at an interval before.
     pub fn resume(&mut self, kept: Vec<Frame>, interval: usize) {
         (self.kept, self.interval) = (kept, interval);

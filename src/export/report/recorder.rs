@@ -19,11 +19,9 @@ use crate::continuum::run::Outcome;
 use crate::engine::Engine;
 use crate::engine::serde_impls;
 use crate::flock::action::ActionKind;
-use crate::flock::pseudo_energy::pe1;
 use crate::flock::role::Role;
 use crate::flock::rules::{Mean, Rotation};
-use crate::flock::strain::{Strain, strain};
-use crate::flock::vectors::Vectors;
+use crate::flock::strain::Strain;
 use crate::material::cells::Cells;
 use crate::material::elastic::{Constants, Plane};
 use crate::material::stress::StressState;
@@ -159,13 +157,10 @@ impl RunRecorder {
         (scene, engine): (&Scene, &Engine),
     ) -> &'a mut Self {
         let recorder = recorder.get_or_insert_with(|| Self::new(scene, engine));
-        // Frames of an earlier program may hold others.
-        let channels = recorder.frames.channels.len();
-        let are_alike = |frame: &Frame| frame.tracks.len() == channels;
-        let goes_on = |earlier: &AnimationState<'_>| {
-            earlier.stride == recorder.stride() && earlier.frames.iter().all(are_alike)
+        let are_of_these = |earlier: &AnimationState<'_>| {
+            earlier.stride == recorder.stride() && recorder.frames.are_of_these(&earlier.frames)
         };
-        let earlier = earlier.take().filter(goes_on);
+        let earlier = earlier.take().filter(are_of_these);
         if let Some(AnimationState { frames, interval, first_roles, roles, changes, .. }) = earlier {
             let mut frames = frames.into_owned();
             if recorder.sample.as_ref().is_some_and(|sample| !sample.is_received()) {
@@ -186,7 +181,7 @@ impl RunRecorder {
                 true => von_mises(engine, 1.0),
                 false => Stresses::von_mises_of_cells(engine),
             };
-            let seen = Seen::new(engine, self.sample.as_ref(), 1.0, &stress);
+            let seen = Seen { engine, sample: self.sample.as_ref(), part: 1.0, stress: &stress };
             self.frames.keep(engine.step(), |_, channel| seen.values(channel).into());
             self.take_roles(engine);
         }
@@ -232,12 +227,12 @@ impl RunRecorder {
                     false => von_mises(engine, part),
                     true => whole.get_or_init(|| von_mises(engine, 1.0)).iter().map(|v| part * v).collect(),
                 };
-                let seen = Seen::new(engine, self.sample.as_ref(), part, &stress);
+                let seen = Seen { engine, sample: self.sample.as_ref(), part, stress: &stress };
                 self.frames.keep(frame, |_, channel| seen.values(channel).into());
             }
         } else {
             let stress = || von_mises(engine, 1.0);
-            let seen = Seen::new(engine, self.sample.as_ref(), 1.0, &stress);
+            let seen = Seen { engine, sample: self.sample.as_ref(), part: 1.0, stress: &stress };
             self.frames.keep_last(engine.step(), |_, channel| seen.values(channel).into());
         }
         self.take_roles(engine);
@@ -371,54 +366,27 @@ impl RunRecorder {
 struct Seen<'a> {
     engine: &'a Engine,
     sample: Option<&'a Sample>,
-    /// The part of the displacements that there is.
+    /// The part of the displacements that is shown.
     part: f64,
-    /// Where particles are, if that is not all.
-    partly: OnceCell<Vectors>,
     stress: &'a dyn Fn() -> Vec<f64>,
 }
 
-impl<'a> Seen<'a> {
-    fn new(
-        engine: &'a Engine,
-        sample: Option<&'a Sample>,
-        part: f64,
-        stress: &'a dyn Fn() -> Vec<f64>,
-    ) -> Self {
-        Self { engine, sample, part, partly: OnceCell::new(), stress }
-    }
-
+impl Seen<'_> {
     /// Values of a channel, shape \[count\].
     fn values(&self, channel: &Channel) -> Vec<f64> {
         let Self { engine, part, .. } = *self;
-        let (flock, present, reference) = (engine.flock(), engine.present(), &engine.body().reference);
+        let (present, reference) = (engine.present(), &engine.body().reference);
         match channel.name {
             "dx" => self.each(|i| part * (present.x[i] - reference.x[i])),
             "dy" => self.each(|i| part * (present.y[i] - reference.y[i])),
-            PE1 => {
-                let places = self.places();
-                self.each(|i| pe1(flock, i, places))
-            }
+            PE1 => self.each(|i| engine.pe1(i)),
             PE2 => self.each(|i| engine.pe2(i)),
-            STRAIN => {
-                let places = self.places();
-                self.each(|i| strain(flock, i, places).map_or(f64::NAN, |strain| strain.largest()))
-            }
+            STRAIN => self.each(|i| engine.strain(i).map_or(f64::NAN, |strain| strain.largest())),
             _ => {
                 let stress = (self.stress)();
                 self.each(|i| stress.get(i).copied().unwrap_or(f64::NAN))
             }
         }
-    }
-
-    fn places(&self) -> &Vectors {
-        let (present, reference) = (self.engine.present(), &self.engine.body().reference);
-        let along = |then: f64, now: f64| then + self.part * (now - then);
-        let partly = || {
-            let pairs = reference.iter().zip(present.iter());
-            pairs.map(|(then, now)| [along(then[0], now[0]), along(then[1], now[1])]).collect()
-        };
-        if self.part == 1.0 { present } else { self.partly.get_or_init(partly) }
     }
 
     fn each(&self, of: impl Fn(usize) -> f64 + Send + Sync) -> Vec<f64> {
