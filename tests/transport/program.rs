@@ -131,7 +131,7 @@ fn a_second_node_of_the_same_robot_is_said_and_one_of_another_is_not() {
     let lines = BufReader::new(running.0.stderr.take().expect("piped")).lines();
     let mut lines = lines.map(|line| line.expect("text"));
     let mut line = |words: &str| lines.find(|line| line.contains(words)).expect("a line");
-    line("robot_7");
+    line("25 robots at");
     let node = |arguments: &[&str]| start_with(&name, arguments, Stdio::null());
     let _other = node(&member("robot_8"));
     let _same = node(&member("robot_7"));
