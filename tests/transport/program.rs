@@ -2,6 +2,7 @@
 
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use flockform::flock::vectors::distance;
 use flockform::scene::swarm::Swarm;
@@ -80,14 +81,24 @@ fn start(domain: &str, subcommand: &str) -> Running {
     start_with(domain, &[subcommand], Stdio::inherit())
 }
 
+/// Waits for a line with these words of what a program says of itself, not for ever.
+fn lines(running: &mut Running) -> impl FnMut(&str) -> String + use<> {
+    let said = BufReader::new(running.0.stderr.take().expect("piped"));
+    let (send, receive) = std::sync::mpsc::channel();
+    std::thread::spawn(move || said.lines().map_while(Result::ok).try_for_each(|line| send.send(line)));
+    move |words| {
+        let next =
+            || receive.recv_timeout(Duration::from_secs(60)).unwrap_or_else(|_| panic!("no `{words}`"));
+        std::iter::repeat_with(next).find(|line| line.contains(words)).expect("without end")
+    }
+}
+
 #[test]
 fn both_say_what_they_serve_as_over_ros_2() {
     let name = domain_name();
     for (subcommand, expected) in [("robots", "25 simulated robots"), ("node", "25 robots at 100.0 Hz")] {
         let mut running = start_with(&name, &[subcommand], Stdio::piped());
-        let mut lines = BufReader::new(running.0.stderr.take().expect("piped")).lines();
-        let line = lines.find(|line| line.as_ref().is_ok_and(|line| line.contains("`square`: ")));
-        let line = line.expect("a line").expect("text");
+        let line = lines(&mut running)("`square`: ");
         assert!(line.contains(expected), "{line}");
         assert_eq!(running.terminate(), Some(0));
     }
@@ -108,9 +119,7 @@ fn start_with(domain: &str, arguments: &[&str], log: Stdio) -> Running {
 fn a_second_node_and_robots_of_another_number_are_said() {
     let name = domain_name();
     let mut running = start_with(&name, &["node"], Stdio::piped());
-    let lines = BufReader::new(running.0.stderr.take().expect("piped")).lines();
-    let mut lines = lines.map(|line| line.expect("text"));
-    let mut line = |words: &str| lines.find(|line| line.contains(words)).expect("a line");
+    let mut line = lines(&mut running);
     line("25 robots at");
     let peer = domain(&name).join("test").expect("shared memory");
     let mut poses = Writer::<Pose>::open(&peer, "square", POSES, &Capacity::SWARM, 1).expect("a writer");
@@ -128,9 +137,7 @@ fn a_second_node_of_the_same_robot_is_said_and_one_of_another_is_not() {
     let name = domain_name();
     let member = |robot| ["node", "--set", "control.sweeps=1", "--member", robot];
     let mut running = start_with(&name, &member("robot_7"), Stdio::piped());
-    let lines = BufReader::new(running.0.stderr.take().expect("piped")).lines();
-    let mut lines = lines.map(|line| line.expect("text"));
-    let mut line = |words: &str| lines.find(|line| line.contains(words)).expect("a line");
+    let mut line = lines(&mut running);
     line("25 robots at");
     let node = |arguments: &[&str]| start_with(&name, arguments, Stdio::null());
     let _other = node(&member("robot_8"));
