@@ -71,7 +71,8 @@ impl Programs {
             return true;
         }
         // A leader that is lost on the way holds up no program, nor does it where an earlier loop had begun and another is heard.
-        if !heard.every_leader && !(self.goes_on && heard.a_leader) {
+        let is_led = heard.every_leader || (self.goes_on && heard.a_leader);
+        if !is_led {
             self.led_since = None;
             return false;
         }
