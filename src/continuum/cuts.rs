@@ -1,5 +1,6 @@
 //! Cuts that miss the body.
 
+#[cfg(feature = "export")]
 use crate::engine::Engine;
 use crate::flock::action::ActionKind;
 use crate::flock::body::Body;
@@ -28,6 +29,7 @@ pub(crate) fn planned(scene: &Scene, body: &Body, neighbours: &Neighbours) -> Ve
 }
 
 /// The warnings after a run, made by all ranks together where each has a part of the body.
+#[cfg(feature = "export")]
 pub(crate) fn made(scene: &Scene, engine: &Engine) -> Vec<String> {
     let neighbours = &engine.flock().neighbours;
     let is_made = |cut: &Segment| engine.any_of_parts(crosses(*cut, engine.body(), neighbours));

@@ -1,6 +1,7 @@
 //! Means and thresholds that do not suit the body, and roles without effect.
 
 use super::layout;
+#[cfg(feature = "export")]
 use crate::engine::Engine;
 use crate::engine::setup::Setup;
 use crate::flock::body::Body;
@@ -82,6 +83,7 @@ pub(crate) fn planned(scene: &Scene, setup: &Setup) -> Vec<String> {
 }
 
 /// The warnings after a run, made by all ranks together where each has a part of the body.
+#[cfg(feature = "export")]
 pub(crate) fn seen(scene: &Scene, engine: &Engine) -> Vec<String> {
     let Doubts { followers, unmoved, long } =
         Doubts::of(engine.body(), engine.flock(), engine.roles(), engine.present());

@@ -7,6 +7,7 @@
 
 pub mod bundled;
 pub mod document;
+#[cfg(feature = "live")]
 mod files;
 pub mod points;
 pub mod raw;

@@ -196,6 +196,7 @@ impl Layout {
     }
 
     /// Whether the shape is flat on a side, so that its outermost particles are those along that.
+    #[cfg(feature = "fem")]
     pub(crate) fn is_flat(&self, side: Side) -> bool {
         let grain = 1e-9 * self.body.lattice.spacing();
         self.outline.as_ref().is_some_and(|outline| !band(outline, side, 0.0, grain).is_empty())

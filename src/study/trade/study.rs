@@ -37,6 +37,7 @@ pub enum Outcome {
 
 impl Outcome {
     /// Its name, and the reason of a refusal, which is empty otherwise.
+    #[cfg(feature = "export")]
     pub(crate) fn words(&self) -> (&'static str, &str) {
         match self {
             Self::Settled => ("settled", ""),

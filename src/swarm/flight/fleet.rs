@@ -117,6 +117,7 @@ impl Fleet {
     }
 
     /// Noise \[m\], delay \[period\] and loss \[1\] with which poses are sent.
+    #[cfg(feature = "live")]
     pub(crate) fn channel(&self) -> (f64, u32, f64) {
         let params = self.channels.first().map(Channel::params).unwrap_or_default();
         (params.noise, params.delay, params.loss)
