@@ -17,7 +17,7 @@ pub fn pose(header: &Header, pose: &geometry_msgs::Pose, arrival: f64, frame_id:
 }
 
 /// How a simulated robot says its pose, in the right frame or in another.
-pub(crate) fn said(pose: &Pose, frame_id: &str) -> (Header, geometry_msgs::Pose) {
+pub fn said(pose: &Pose, frame_id: &str) -> (Header, geometry_msgs::Pose) {
     let frame_id = if pose.frame_is_right { frame_id } else { "elsewhere" };
     let header = Header { stamp: Time::from_seconds(pose.stamp), frame_id: frame_id.into() };
     (header, geometry_msgs::Pose::planar(pose.position, pose.yaw))
