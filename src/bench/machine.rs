@@ -9,9 +9,10 @@
 //! ordinary store first reads the cache line it is about to overwrite (write-allocate). Rooflines
 //! divide what they move by what was moved: the second number.
 
-use crate::solve::stopwatch::median;
 use std::hint::black_box;
 use std::time::Instant;
+
+use crate::solve::stopwatch::median;
 
 use rayon::prelude::*;
 use serde::Serialize;

@@ -259,12 +259,12 @@ impl Mechanics {
         let is_material = matches!(engine.flock().rule.mean, Mean::Material { .. });
         let is_strained = self.largest_strain > SMALL_STRAIN;
         let growth = (is_material && is_strained).then(|| growth(engine)).flatten();
-        match rotation(engine) {
-            _ if growth.is_some() => cautions.extend(growth.map(|cause| {
-                let strain = percent(self.largest_strain);
-                format!("strains of up to {strain}, and the sweep grows from step to step: {cause}")
-            })),
-            Rotation::Small if is_material && (is_strained || self.largest_turn > SMALL_TURN) => {
+        match (growth, rotation(engine)) {
+            (Some(cause), _) => cautions.push(format!(
+                "strains of up to {}, and the sweep grows from step to step: {cause}",
+                percent(self.largest_strain)
+            )),
+            (None, Rotation::Small) if is_material && (is_strained || self.largest_turn > SMALL_TURN) => {
                 cautions.push(format!(
                     "strains of up to {} and turns of up to {:.0} degrees under rotation = \"small\", which is right \
                      for small ones (10 %, 10 degrees): displacements and forces are proportional to the load, as they are \
@@ -273,7 +273,7 @@ impl Mechanics {
                     self.largest_turn.to_degrees()
                 ));
             }
-            Rotation::Corotated if is_material && is_strained => cautions.push(format!(
+            (None, Rotation::Corotated) if is_material && is_strained => cautions.push(format!(
                 "strains of up to {} under rotation = \"corotated\", which follows turns of any size but is right for \
                  small strains (10 %): stress stays proportional to strain, and forces act on undeformed lengths",
                 percent(self.largest_strain)

@@ -20,7 +20,7 @@ use crate::flock::role::Role;
 use crate::flock::rules::{FeedbackReference, Mean, Rotation};
 use crate::geometry::point::area;
 use crate::material::outline_loads::Resultant;
-use crate::scene::raw::{RawLoad, RawShape};
+use crate::scene::raw::RawLoad;
 use crate::scene::text::counted;
 use crate::scene::{LoadSteps, Scene, SceneError, Weights as SceneWeights};
 use crate::sweep::{Order, Sweep};
@@ -320,9 +320,8 @@ pub(crate) fn dead_pressure(scene: &Scene) -> Option<String> {
 
 /// The warning about stress along edges that could follow the outline and do not, if there is one.
 pub(crate) fn whole_cells(scene: &Scene) -> Option<String> {
-    let has_outline = !matches!(scene.raw.body.shape, RawShape::Grid { .. } | RawShape::Points { .. });
     let is_material = matches!(scene.mean, Mean::Material { .. });
-    (has_outline && is_material && !scene.is_fitted).then(|| {
+    (scene.raw.body.shape.has_outline() && is_material && !scene.is_fitted).then(|| {
         "stress is not recovered along the edges of a body of whole cells: there it is the mean of a particle's cells, half a \
          cell within the body; leave body.outline out"
             .to_owned()

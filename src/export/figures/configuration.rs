@@ -107,7 +107,8 @@ impl Setting {
         let owned = subject.body.owned();
         let within = subject.bounds(page::bounds(&snapshot.positions, owned.clone()));
         self.bounds = page::around_both(self.bounds, within);
-        self.at_rest = subject.bounds(page::bounds(&subject.body.reference, owned.clone()));
+        let at_rest = || subject.bounds(page::bounds(&subject.body.reference, owned.clone()));
+        self.at_rest = self.at_rest.or_else(at_rest);
         let is_here = |role: Role| f64::from(snapshot.roles[owned.clone()].contains(&role));
         let are_present = subject.largest(PAINTING_ORDER.map(is_here));
         let is_there = |role: Role| PAINTING_ORDER.into_iter().zip(are_present).any(|one| one == (role, 1.0));

@@ -11,6 +11,7 @@ use crate::continuum::run::Outcome;
 use crate::engine::Engine;
 use crate::export::figures::configuration::{Setting, configuration_in};
 use crate::export::figures::{Subject, displaced, page};
+use crate::export::largest_strain;
 use crate::export::report::RunRecorder;
 use crate::export::report::recorder::{PE1, PE2, STRAIN, VON_MISES, is_linear};
 use crate::flock::pseudo_energy::pe1_among;
@@ -48,7 +49,7 @@ pub fn film<'a>(
     colour: FilmColour,
 ) -> Film<'a> {
     let frames = chosen(recorder.frames().len());
-    let shown = Shown { scene, engine: &outcome.engine, recorder, colour };
+    let shown = Shown::new(scene, &outcome.engine, recorder, colour);
     let mut setting = Setting::of_film();
     let subject = Subject::of(scene, &outcome.engine);
     for &frame in &frames {
@@ -76,9 +77,23 @@ struct Shown<'a> {
     engine: &'a Engine,
     recorder: &'a RunRecorder,
     colour: FilmColour,
+    /// Of the body at the end, where strains are computed from the frames \[1\].
+    largest_strain: Option<f64>,
 }
 
-impl Shown<'_> {
+impl<'a> Shown<'a> {
+    fn new(scene: &'a Scene, engine: &'a Engine, recorder: &'a RunRecorder, colour: FilmColour) -> Self {
+        let quantity = match colour {
+            FilmColour::Strain => Some(STRAIN),
+            FilmColour::VonMises => Some(VON_MISES),
+            FilmColour::Pe1 => Some(PE1),
+            _ => None,
+        };
+        let is_computed = quantity.is_some_and(|quantity| !recorder.keeps(quantity));
+        let largest_strain = is_computed.then(|| largest_strain(engine)).flatten();
+        Self { scene, engine, recorder, colour, largest_strain }
+    }
+
     /// As it was kept; at the end as it is.
     fn displacement(&self, frame: usize) -> Vectors {
         if frame + 1 == self.recorder.frames().len() {
@@ -128,25 +143,14 @@ impl Shown<'_> {
     fn uncertain(&self, frame: usize) -> Option<f64> {
         /// Part of the largest strain that is seen \[1\].
         const SEEN: f64 = 0.02;
-        /// Particles that are asked for theirs.
-        const ASKED: usize = 1000;
-        let quantity = match self.colour {
-            FilmColour::Strain => STRAIN,
-            FilmColour::VonMises => VON_MISES,
-            FilmColour::Pe1 => PE1,
-            _ => return None,
-        };
+        let largest = self.largest_strain.filter(|&largest| largest > 0.0)?;
         let frames = self.recorder.frames();
-        if frame + 1 == frames.len() || self.recorder.keeps(quantity) {
+        if frame + 1 == frames.len() {
             return None;
         }
         let quantum = |axis: usize| f64::from(frames[frame].tracks[axis].exponent).exp2();
         let strain = quantum(0).max(quantum(1)) / self.engine.body().lattice.spacing();
-        let count = self.engine.body().count();
-        let asked = (0..count).step_by(count.div_ceil(ASKED).max(1));
-        let largest =
-            asked.filter_map(|i| self.engine.strain(i)).map(|one| one.largest()).fold(0.0, f64::max);
-        (strain > SEEN * largest && largest > 0.0).then_some(strain)
+        (strain > SEEN * largest).then_some(strain)
     }
 
     /// Shape \[count\]; none where roles are shown.
@@ -257,7 +261,7 @@ mod tests {
         let mut recorder = recorder.expect("it has looked");
         recorder.close(&scene, &outcome);
         for (colour, expected) in [(FilmColour::Strain, 1e-4), (FilmColour::VonMises, 21.0)] {
-            let shown = Shown { scene: &scene, engine: &outcome.engine, recorder: &recorder, colour };
+            let shown = Shown::new(&scene, &outcome.engine, &recorder, colour);
             let worst = |frame: usize| {
                 let values = shown.values(frame).expect("shown");
                 values.iter().map(|value| (value / expected - 1.0).abs()).fold(0.0, f64::max)

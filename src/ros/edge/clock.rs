@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use super::topic::MOST_AT_ONCE;
 use super::{EdgeError, Node, Quality, Subscription};
 use crate::messages::rosgraph_msgs;
 use crate::swarm::pace::system_time;
@@ -10,9 +11,6 @@ use crate::swarm::pace::system_time;
 pub struct Clock {
     simulated: Option<Simulated>,
 }
-
-/// Readings that are taken at once: a flood must not hold a loop.
-const MOST_AT_ONCE: usize = 1024;
 
 /// Silence of a simulator that is worth a word.
 const PATIENCE: Duration = Duration::from_secs(3);

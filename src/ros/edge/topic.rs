@@ -89,7 +89,7 @@ const PATIENCE: [Duration; 2] = [Duration::from_secs(2), Duration::from_secs(60)
 const OVER_PERIOD: u32 = 4;
 
 /// Samples looked at in one call: a flood of bad ones must not hold the loop.
-const MOST_AT_ONCE: usize = 1024;
+pub(super) const MOST_AT_ONCE: usize = 1024;
 
 impl<M: Message> Subscription<M> {
     /// Of a node, by its full name.

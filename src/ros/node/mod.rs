@@ -259,7 +259,7 @@ impl FormationNode {
                 }
                 None => self.attend(),
             }
-            let hears_any = self.hears_any();
+            let hears_any = self.pulse.is_some() && self.hears_any();
             if let Some(pulse) = &self.pulse {
                 match &self.endpoints {
                     Some(endpoints) => pulse.note_peers(hears_any, || endpoints.link.left()),

@@ -213,3 +213,10 @@ pub enum RawShape {
         lying: bool,
     },
 }
+
+impl RawShape {
+    /// Whether it has an outline of its own: what is given by count or by points has none.
+    pub(crate) fn has_outline(&self) -> bool {
+        !matches!(self, Self::Grid { .. } | Self::Points { .. })
+    }
+}

@@ -212,7 +212,7 @@ fn profile(load: usize, raw: &Option<RawProfile>, refuse: Refuse<'_>) -> Result<
 
 /// Whether the body keeps its outline: as written, or what suits the rule.
 pub fn is_fitted(raw: &RawScene, refuse: Refuse<'_>) -> Result<bool, SceneError> {
-    let has_outline = !matches!(raw.body.shape, RawShape::Grid { .. } | RawShape::Points { .. });
+    let has_outline = raw.body.shape.has_outline();
     match raw.body.outline {
         None => Ok(is_material(raw) && has_outline),
         Some(RawOutline::Lattice) => Ok(false),

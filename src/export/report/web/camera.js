@@ -39,7 +39,7 @@ export function follow() {
   else state.camera = { x: (low[0] + high[0]) / 2, y: (low[1] + high[1]) / 2, scale };
 }
 
-// Pixels of a unit of length at most: beyond, places cannot be told apart.
+// Pixels of a unit of length at most: nearer, places cannot be distinguished.
 function mostPixels({ x, y }) {
   return 2 ** 44 / Math.max(Math.abs(x), Math.abs(y), bodies[0].animation.spacing || 1e-3);
 }

@@ -97,7 +97,7 @@ export class Chart {
     const marks = (axis, [low, high], most) =>
       axis.log ? logTicks(10 ** low, 10 ** high, most) : ticks(low, high, most);
     const yTicks = marks(plot.y, ys, 6);
-    // Ticks that lie near each other take more digits to be told apart.
+    // Ticks that lie near each other take more digits to be distinguished.
     const named = (axis, all) => {
       const step = all[1] - all[0];
       return all.map((value) => [value, axis.log || !(step > 0) ? words(value, 4) : placeWords(value, step)]);

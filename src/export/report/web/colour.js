@@ -61,7 +61,7 @@ export function placeWords(value, part) {
 export function ticks(low, high, most) {
   const raw = (high - low) / Math.max(most, 1);
   if (!(raw > 0) || !Number.isFinite(raw)) return [low];
-  // Numbers of these digits cannot be told apart any more.
+  // Numbers of these digits cannot be distinguished any more.
   if (raw < 2 ** -48 * Math.max(Math.abs(low), Math.abs(high))) return [low];
   const decade = 10 ** Math.floor(Math.log10(raw));
   const step = [1, 2, 5, 10].map((m) => m * decade).find((s) => s >= raw * 0.999);
