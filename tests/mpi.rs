@@ -406,6 +406,40 @@ fn a_run_in_parts_has_figures_of_all_and_a_report_of_a_sample() {
 
 #[test]
 #[ignore = "needs mpirun"]
+fn a_run_in_parts_is_recorded_whole_and_its_film_shows_the_same_sample_on_any_number_of_ranks() {
+    let folder = temporary();
+    std::fs::write(folder.path().join("fitted.toml"), FITTED).expect("written");
+    let grid = ["--set", "body.shape={kind=\"grid\",columns=300,rows=210}", "--steps", "20"];
+    let large = ["--set", "lattice.spacing=0.4"];
+    let scenes: [(&str, &str, &[&str]); 3] = [
+        ("tension", "pe1", &grid),
+        ("fitted.toml", "von-mises", &large),
+        ("beam-loaded", "strain", &LARGE_BEAM),
+    ];
+    for (name, colour, more) in scenes {
+        let files = |ranks: usize| ["gif", "mcap"].map(|kind| format!("{ranks}.{kind}"));
+        let run = |ranks: usize| {
+            let [film, record] = &files(ranks);
+            let outputs = ["--film", film, "--film-colour", colour, "--record", record, "--figures", "none"];
+            let arguments =
+                [&["run", name, "--no-report", "--force", "--out", "out"][..], &outputs, more].concat();
+            let output = match ranks {
+                1 => flockform(&arguments, folder.path()),
+                _ => on_ranks(ranks, &arguments, folder.path()),
+            };
+            assert_ends_well(&output, name);
+            assert_eq!(ranks > 1, !text(&output.stderr).contains("whole body"), "{name}");
+        };
+        [1, 2, 3].map(run);
+        let read = |file: &str| std::fs::read(folder.path().join(file)).expect(file);
+        let [alone, two, three] = [1, 2, 3].map(|ranks| files(ranks).map(|file| read(&file)));
+        assert!(two == three, "{name}");
+        assert!(two[1] == alone[1], "{name}: recordings");
+    }
+}
+
+#[test]
+#[ignore = "needs mpirun"]
 fn every_rank_writes_its_piece_of_a_frame() {
     let folder = temporary();
     let run = ["run", "tension", "--out", "o", "--steps", "30", "--set", "record.vtk_every=20"];

@@ -61,7 +61,7 @@ impl BodyFilmArguments {
     /// The film, if one is asked for, in a colour that the body has, beside these results.
     pub fn open(
         &self,
-        results: Option<&OutputFolder>,
+        results: &OutputFolder,
         force: bool,
         require: impl FnOnce(FilmColour) -> Result<(), FilmError>,
     ) -> Result<Option<AskedFilm>, Refusal> {
@@ -76,19 +76,14 @@ impl SwarmFilmArguments {
     /// The film, if one is asked for, beside these results.
     pub fn open(&self, results: &OutputFolder, force: bool) -> Result<Option<AskedFilm>, Refusal> {
         let colour = self.film_colour.unwrap_or(FilmColour::Role);
-        self.film.as_ref().map(|path| AskedFilm::open(path, Some(results), force, colour)).transpose()
+        self.film.as_ref().map(|path| AskedFilm::open(path, results, force, colour)).transpose()
     }
 }
 
 impl AskedFilm {
     /// Its file stands beside its place until it is made, and an interrupt removes it.
-    fn open(
-        path: &Path,
-        results: Option<&OutputFolder>,
-        force: bool,
-        colour: FilmColour,
-    ) -> Result<Self, Refusal> {
-        results.map_or(Ok(()), |results| results.require_outside(path))?;
+    fn open(path: &Path, results: &OutputFolder, force: bool, colour: FilmColour) -> Result<Self, Refusal> {
+        results.require_outside(path)?;
         let file = FilmFile::create(path, force)?;
         interrupt::removes([file.part().to_owned()]);
         Ok(Self { file, colour })

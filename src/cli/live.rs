@@ -94,7 +94,7 @@ fn record(session: &dyn Session, recording: &Shared, folder: Option<&Path>) -> R
     let (name, _) = session.title();
     if session.is_body() {
         let scene = Scene::parse(name, "the session", &text, &[], folder)?;
-        let mut messages = BodyMessages::new(&scene, recording.sink())?;
+        let mut messages = BodyMessages::new(&scene, Some(recording.sink()))?;
         let outcome = run(Plan::new(&scene)?, &mut |engine, residual| {
             messages.step(engine, residual);
             ControlFlow::Continue(())

@@ -52,7 +52,7 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
             let of_parts = parts.map(|parts| {
                 let are_drawn = is_raster(parts.total());
                 let figures = if are_drawn { Formats::All } else { Formats::None };
-                let outputs = [Outputs { figures, report: true }, Outputs::TABLES];
+                let outputs = [Outputs { figures, ..Outputs::ALL }, Outputs::TABLES];
                 let bytes = outputs.map(|outputs| of_part(&scene, &parts.largest, count, (outputs, true)));
                 parts.facts(bytes, are_drawn)
             });

@@ -25,13 +25,11 @@ impl RecordArguments {
     /// The recording beside these results, if one is asked for; a file in its place is replaced with `force` alone.
     pub fn open_beside(
         &self,
-        results: Option<&OutputFolder>,
+        results: &OutputFolder,
         about: &About,
         force: bool,
     ) -> Result<Option<Shared>, Refusal> {
-        if let (Some(path), Some(results)) = (&self.record, results) {
-            results.require_outside(path)?;
-        }
+        self.record.iter().try_for_each(|path| results.require_outside(path))?;
         let recording = self.create(about, force, 1)?;
         // An end that keeps no results keeps no part of their recording either.
         interrupt::removes(recording.iter().map(|recording| recording.part().to_owned()));

@@ -107,7 +107,8 @@ impl Prepared {
         let mut left = arguments.checkpoints.left()?;
         let asked = arguments.asked(left.as_ref());
         let words_of = SceneArguments::new(&asked.scene, &asked.set);
-        let may_be_parted = |scene: &Scene| team.is_some() && arguments.may_be_parted(scene);
+        // Unless something is asked for that shows each particle of a small one.
+        let may_be_parted = |scene: &Scene| team.is_some() && laid_out_whole_for(scene).is_none();
         let parts = |scene: &Scene| if may_be_parted(scene) { team.map_or(1, Team::count) } else { 1 };
         let scene = words_of.load_part(&[], parts)?;
         // Before a choice, which solves the scene several times.
@@ -118,8 +119,8 @@ impl Prepared {
             // What follows all ranks do together.
             begin.agree(arguments.common(&scene))?;
             let parting = Parting::among(&scene, team)?;
-            // In a small body each particle is drawn, which takes all of them.
-            if !arguments.outputs().draws() || is_raster(parting.total()) {
+            // Of a small body each particle is drawn and recorded with its bonds, which takes all of them.
+            if !arguments.shows_each() || is_raster(parting.total()) {
                 let scene = interruptible(scene);
                 let plan = Plan::of_counted_part(&scene, &parting, team)?;
                 let digest = digest_of_parts(&plan, team);
@@ -187,8 +188,9 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     }
     let Prepared { left, asked, scene, words, mut plan, digest, .. } = prepared;
     let shown = arguments.publish.as_ref();
-    let open = |name: &String| Positions::open(&Domain::from_environment()?, name, plan.count());
-    let shown = shown.map(open).transpose()?;
+    let total = plan.setup.body.total();
+    let open = |name: &String| Positions::open(&Domain::from_environment()?, name, total);
+    let shown = shown.filter(|_| others.is_none()).map(open).transpose()?;
     let folder = others.is_none().then(|| match &left {
         Some(left) => left.open(),
         None => arguments.output.folder(&scene.name),
@@ -200,9 +202,12 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     }
     let required = |colour| film::run::require_colour(&scene, colour);
     let force = arguments.output.force;
-    let film = arguments.film.open(folder.as_ref(), force, required)?;
+    let film = match &folder {
+        Some(folder) => arguments.film.open(folder, force, required)?,
+        None => None,
+    };
     let setup = start.elapsed();
-    let (own, total) = (plan.setup.body.owned().len(), plan.setup.body.total());
+    let own = plan.setup.body.owned().len();
     tracing::info!("planned {own} of {total} particles of `{}` in {setup:.1?}", scene.name);
     tracing::info!("{}", flockform::sweep::chosen_here());
 
@@ -216,15 +221,19 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
             undrawn.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
         );
     }
-    let outputs = (arguments.outputs(), film.is_some());
-    let recorder = Recorder::new(&scene, &plan, folder.as_ref(), left.as_ref(), outputs)?;
+    let recorder = Recorder::new(&scene, &plan, folder.as_ref(), left.as_ref(), arguments.outputs())?;
     let about = About { source: "run", name: scene.name.clone(), ..About::default() };
-    let recording = arguments.record.open_beside(folder.as_ref(), &about, force)?;
-    let messages = recording.as_ref().map(|one| BodyMessages::new(&scene, one.sink())).transpose()?;
+    let recording = match &folder {
+        Some(folder) => arguments.record.open_beside(folder, &about, force)?,
+        None => None,
+    };
+    let sink = || recording.as_ref().map(|one| one.sink());
+    let messages = arguments.record.is_asked().then(|| BodyMessages::new(&scene, sink())).transpose()?;
     let quiet = arguments.output.quiet || folder.is_none();
     let mut observer = RunObserver {
         recorder,
-        looks: Looks::new(&plan, shown.is_some() || messages.is_some()),
+        looks: Looks::new(&plan, arguments.publish.is_some()),
+        is_shown: arguments.publish.is_some(),
         shown,
         messages,
         progress: Progress::of_steps(quiet, scene.most_steps()),
@@ -322,23 +331,21 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
 }
 
 impl RunArguments {
-    /// Whether each rank can lay out a part of the body: where nothing that is asked for needs the whole, unless figures of a
-    /// small one do.
-    fn may_be_parted(&self, scene: &Scene) -> bool {
-        let needs_whole = self.film.is_asked() || self.record.is_asked() || self.publish.is_some();
-        !needs_whole && laid_out_whole_for(scene).is_none()
+    /// Whether something is asked for that shows each particle of a small body.
+    fn shows_each(&self) -> bool {
+        self.outputs().draws() || self.film.is_asked() || self.record.is_asked()
     }
 
     fn outputs(&self) -> Outputs {
-        Outputs { figures: self.figures.figures, report: !self.report.no_report }
+        let film = self.film.is_asked();
+        Outputs { figures: self.figures.figures, report: !self.report.no_report, film }
     }
 
     /// A fingerprint of what ranks must have in common before they lay out a body: the scene, with what it read from files, and
     /// the options that decide what all of them do together.
     fn common(&self, scene: &Scene) -> u64 {
         let mut all = serde_json::to_vec(&scene.raw).expect("a scene was read from text");
-        let asked =
-            (self.outputs(), self.checkpoints.every(), [self.film.is_asked(), self.record.is_asked()]);
+        let asked = (self.outputs(), self.checkpoints.every(), self.record.is_asked());
         all.extend(format!("{:?} {asked:?} {:?}", scene.roles, self.publish).bytes());
         fnv1a(&all)
     }

@@ -116,7 +116,7 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let (folder, force) = (arguments.output.folder(&swarm.name)?, arguments.output.force);
     let film = arguments.film.open(&folder, force)?;
     let about = arguments.swarm.about("swarm", &swarm);
-    let recording = arguments.record.open_beside(Some(&folder), &about, force)?;
+    let recording = arguments.record.open_beside(&folder, &about, force)?;
     let reports = !arguments.report.no_report;
     let mut recorder = (reports || film.is_some()).then(|| FlightRecorder::new(&flight));
     let interrupted = interrupt::keeps();

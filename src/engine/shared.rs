@@ -208,6 +208,36 @@ impl Engine {
         halo.receives.iter().zip(&received).flat_map(of_rank).collect()
     }
 
+    /// The words that `of` says of each particle of the whole body, in the order in which files and messages have them. Of a body in
+    /// parts the first rank has all of them, the others nothing.
+    pub fn of_all<const N: usize>(&self, of: impl Fn(usize) -> [u64; N]) -> Vec<[u64; N]> {
+        /// Particles of a piece on its way.
+        const OF_A_PIECE: usize = 1 << 15;
+        /// In place of a place after all others.
+        const IN_ORDER: u64 = u64::MAX;
+        let Some(team) = self.parted() else { return self.body.rows().map(of).collect() };
+        let one = |&particle: &usize| {
+            let place = self.body.index_after_all(particle).map_or(IN_ORDER, |place| place as u64);
+            [place].into_iter().chain(of(particle)).flat_map(u64::to_le_bytes)
+        };
+        let own = self.body.owned_in_order();
+        let (mut all, mut later) = (Vec::new(), Vec::new());
+        team.bring(own.chunks(OF_A_PIECE).map(|some| some.iter().flat_map(one).collect()), |piece| {
+            let (words, _) = piece.as_chunks::<8>();
+            let words: Vec<u64> = words.iter().map(|word| u64::from_le_bytes(*word)).collect();
+            for one in words.chunks_exact(N + 1) {
+                let of_it = std::array::from_fn(|k| one[k + 1]);
+                match one[0] {
+                    IN_ORDER => all.push(of_it),
+                    place => later.push((place, of_it)),
+                }
+            }
+        });
+        later.sort_unstable_by_key(|(place, _)| *place);
+        all.extend(later.into_iter().map(|(_, of_it)| of_it));
+        all
+    }
+
     /// Whether it is so in any part of the body.
     pub fn any_of_parts(&self, own: bool) -> bool {
         self.parted().map_or(own, |team| team.any(own))

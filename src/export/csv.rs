@@ -107,10 +107,7 @@ pub(super) fn write_final(
     let header = headers.find(|header| !header.is_empty()).unwrap_or_default();
     let Some(folder) = folder else {
         let Some(team) = team else { return Ok(None) };
-        for piece in before {
-            team.send_bytes(&rows.text(piece).unwrap_or_default());
-        }
-        team.send_bytes(&[]);
+        team.bring(before.into_iter().map(|piece| rows.text(piece).unwrap_or_default()), |_| ());
         let _ = sorted(team, &rows, last);
         return Ok(None);
     };
@@ -120,18 +117,18 @@ pub(super) fn write_final(
         file.write_all(&header).and_then(|()| rows.write(before, &mut file)).map(|()| file)
     });
     // What the others send is received in any case: they wait until it is.
-    for (team, rank) in team.iter().flat_map(|team| (1..team.count()).map(move |rank| (team, rank))) {
-        loop {
-            let piece = team.receive_bytes(rank);
-            if piece.is_empty() {
-                break;
-            }
-            file = file.and_then(|mut file| file.write_all(&piece).map(|()| file));
+    let mut append = |piece: &[u8]| {
+        if let Ok(to) = &mut file
+            && let Err(error) = to.write_all(piece)
+        {
+            file = Err(error);
         }
+    };
+    if let Some(team) = team {
+        team.bring([], &mut append);
+        append(&sorted(team, &rows, last));
     }
-    let last = team.map_or_else(Vec::new, |team| sorted(team, &rows, last));
-    file.and_then(|mut file| file.write_all(&last).and_then(|()| file.flush()))
-        .map_err(ExportError::io("write", &path))?;
+    file.and_then(|mut file| file.flush()).map_err(ExportError::io("write", &path))?;
     Ok(Some(path))
 }
 

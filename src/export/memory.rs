@@ -34,17 +34,24 @@ pub struct Outputs {
     pub figures: Formats,
     /// Whether there shall be a `report.html`.
     pub report: bool,
+    /// Whether there shall be a film.
+    pub film: bool,
 }
 
 impl Outputs {
     /// Tables and the summary alone.
-    pub const TABLES: Self = Self { figures: Formats::None, report: false };
+    pub const TABLES: Self = Self { figures: Formats::None, report: false, film: false };
     /// All that a run writes when nothing else is asked for.
-    pub const ALL: Self = Self { figures: Formats::All, report: true };
+    pub const ALL: Self = Self { figures: Formats::All, report: true, film: false };
 
     /// Whether there shall be figures.
     pub fn draws(self) -> bool {
         self.figures != Formats::None
+    }
+
+    /// Whether frames are kept on the way.
+    pub fn keeps_frames(self) -> bool {
+        self.report || self.film
     }
 }
 
@@ -60,7 +67,7 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
     let [snapshots, last] = kept.map(|each| each * SNAPSHOT * plan.count());
     let drawn = if is_drawn_at_once { DRAWN * (drawn_before + 1) } else { 0 };
     let Packed { values, frames, packing, text } =
-        if outputs.report { packed(scene, plan) } else { Packed::default() };
+        if outputs.report { packed(scene, plan, false) } else { Packed::default() };
     let while_stepping = if is_drawn_at_once { drawing_at_once(plan) } else { 0 };
     let stepping = match is_solved_at_once {
         true => solving(scene, plan).max(while_stepping),
@@ -117,7 +124,7 @@ pub fn of_part(
     let [each, of_rank] = MPI;
     let halo = plan.setup.body.part.as_ref().map_or(0, |part| part.exact.len() - part.owned.len());
     let Packed { values, frames, packing, .. } =
-        if outputs.report && writes { packed(scene, plan) } else { Packed::default() };
+        if outputs.keeps_frames() && writes { packed(scene, plan, outputs.film) } else { Packed::default() };
     let stepping = ON_THE_WAY * halo + taken_back(scene, plan);
     let moments = scene.record.figures.len() + 1;
     let while_stepping = if outputs.draws() { drawing_at_once(plan) } else { 0 };

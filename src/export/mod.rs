@@ -243,17 +243,10 @@ pub fn probes_of_parts(engine: &Engine, probes: &[usize], team: &Team) -> Vec<Pr
     if probes.is_empty() {
         return Vec::new();
     }
-    let own = engine.probes();
-    if !team.is_first() {
-        team.send_bytes(&postcard::to_stdvec(own).expect("a history can be written"));
-        return Vec::new();
-    }
-    let mut all = own.to_vec();
-    for rank in 1..team.count() {
-        let others: Vec<ProbeSeries> =
-            postcard::from_bytes(&team.receive_bytes(rank)).expect("as it was sent");
-        all.extend(others);
-    }
+    let mut all: Vec<ProbeSeries> = Vec::new();
+    team.bring([postcard::to_stdvec(engine.probes()).expect("a history can be written")], |histories| {
+        all.extend(postcard::from_bytes::<Vec<ProbeSeries>>(histories).expect("as it was sent"));
+    });
     let of = |&index: &usize| all.iter().find(|probe| probe.particle == index).cloned();
     probes.iter().filter_map(of).collect()
 }

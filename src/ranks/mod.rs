@@ -195,14 +195,27 @@ impl Team {
         lengths.iter().map(bytes).collect()
     }
 
-    /// Sends bytes to the first rank, which receives them from this one by [`Team::receive_bytes`].
-    pub fn send_bytes(&self, bytes: &[u8]) {
+    /// Has the first rank `take` the pieces of all ranks, in their order: its own ones and, as they come, those of the others. Empty
+    /// ones are left out.
+    pub(crate) fn bring(&self, own: impl IntoIterator<Item = Vec<u8>>, mut take: impl FnMut(&[u8])) {
+        let own = own.into_iter().filter(|piece| !piece.is_empty());
+        if !self.is_first() {
+            own.chain([Vec::new()]).for_each(|piece| self.send_bytes(&piece));
+            return;
+        }
+        own.for_each(|piece| take(&piece));
+        for rank in 1..self.count {
+            let received = || Some(self.receive_bytes(rank)).filter(|piece| !piece.is_empty());
+            std::iter::from_fn(received).for_each(|piece| take(&piece));
+        }
+    }
+
+    fn send_bytes(&self, bytes: &[u8]) {
         self.swap(&[(0, vec![bytes.len() as u64])], &[]);
         self.swap(&[(0, packed(bytes))], &[]);
     }
 
-    /// Bytes that a rank sends by [`Team::send_bytes`]; for the first rank.
-    pub fn receive_bytes(&self, from: usize) -> Vec<u8> {
+    fn receive_bytes(&self, from: usize) -> Vec<u8> {
         let length = self.swap(&[], &[(from, 1)])[0][0] as usize;
         unpacked(&self.swap(&[], &[(from, length.div_ceil(8))])[0], length)
     }

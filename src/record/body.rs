@@ -25,11 +25,13 @@ pub const STEP: f64 = 0.05;
 const FRAMES: usize = 500;
 /// Larger bodies are recorded without what a player could not show of them: members, then bonds.
 const MOST_MEMBERS: usize = 5_000;
-const MOST_BONDS: usize = 200_000;
+/// With three for each particle, the least of all lattices, of 60,000: of more, ranks may have a part each.
+const MOST_BONDS: usize = 180_000;
 
 /// Writes down a run, step by step.
 pub struct BodyMessages {
-    recorder: MessageRecorder,
+    /// Of the rank that writes.
+    recorder: Option<MessageRecorder>,
     name: String,
     every: usize,
     solved: bool,
@@ -41,18 +43,19 @@ pub struct BodyMessages {
 }
 
 impl BodyMessages {
-    /// Every `record.vtk_every` steps, or about 500 of them all.
+    /// Every `record.vtk_every` steps, or about 500 of them all. Where ranks have a part of the body each, all of them look at it
+    /// and the first one alone has a sink.
     ///
     /// # Errors
     /// None for the names of this program.
-    pub fn new(scene: &Scene, sink: RecordSink) -> Result<Self, RecordError> {
+    pub fn new(scene: &Scene, sink: Option<RecordSink>) -> Result<Self, RecordError> {
         let names = Names::new(NAME, "/", &[])?;
         let every = match scene.record.vtk_every {
             0 => scene.stop.steps.div_ceil(FRAMES).max(1),
             every => every,
         };
         Ok(Self {
-            recorder: MessageRecorder::new(&names, "world", sink)?,
+            recorder: sink.map(|sink| MessageRecorder::new(&names, "world", sink)).transpose()?,
             name: scene.name.clone(),
             solved: scene.equilibrium.is_some(),
             every,
@@ -62,6 +65,11 @@ impl BodyMessages {
             state: names.topic("~/state")?,
             diagnostics: names.topic("/diagnostics")?,
         })
+    }
+
+    /// The next step, after `step`, that is recorded.
+    pub fn next(&self, step: usize) -> usize {
+        if self.solved { step + 1 } else { (step / self.every + 1) * self.every }
     }
 
     /// A step; most are passed over.
@@ -84,11 +92,18 @@ impl BodyMessages {
         let header = Header { stamp: Time::from_seconds(time), frame_id: "world".into() };
         let times = [time; 2];
         let present = engine.present();
-        let poses = engine.body().rows().map(|i| Pose::planar(present.get(i), 0.0)).collect();
-        self.recorder.take(&self.poses, &PoseArray { header: header.clone(), poses }, times);
-        self.recorder.take(&self.markers, &markers(engine, &header), times);
-        self.recorder.take(&self.state, &state(engine, &self.name, header.clone()), times);
-        self.recorder.take(&self.diagnostics, &diagnostics(engine, &self.name, header, residual), times);
+        let seen = engine
+            .of_all(|i| [present.x[i].to_bits(), present.y[i].to_bits(), engine.roles()[i].number().into()]);
+        let state = state(engine, &self.name, header.clone());
+        let Some(recorder) = &mut self.recorder else { return };
+        let place = |[x, y, _]: &[u64; 3]| [x, y].map(|&bits| f64::from_bits(bits));
+        let poses = seen.iter().map(|one| Pose::planar(place(one), 0.0)).collect();
+        recorder.take(&self.poses, &PoseArray { header: header.clone(), poses }, times);
+        let role = |[.., number]: &[u64; 3]| Role::ALL[*number as usize];
+        let of_all = seen.iter().map(|one| (place(one), role(one)));
+        recorder.take(&self.markers, &markers(engine, &header, of_all), times);
+        recorder.take(&self.state, &state, times);
+        recorder.take(&self.diagnostics, &diagnostics(engine, &self.name, header, residual), times);
     }
 }
 
@@ -102,24 +117,27 @@ fn colour(role: Role) -> ColorRGBA {
     ColorRGBA { r, g, b, a }
 }
 
-fn markers(engine: &Engine, header: &Header) -> MarkerArray {
+fn markers(
+    engine: &Engine,
+    header: &Header,
+    all: impl ExactSizeIterator<Item = ([f64; 2], Role)>,
+) -> MarkerArray {
     let spacing = engine.body().lattice.spacing();
     let size = 0.4 * spacing;
-    let particles = Marker {
+    let mut particles = Marker {
         header: header.clone(),
         ns: "particles".into(),
         // Spheres have a size in metres, which some viewers take for pixels where it is that of points; they take longer to draw.
-        r#type: if engine.present().len() <= MOST_MEMBERS { Marker::SPHERE_LIST } else { Marker::POINTS },
+        r#type: if all.len() <= MOST_MEMBERS { Marker::SPHERE_LIST } else { Marker::POINTS },
         scale: Vector3 { x: size, y: size, z: size },
-        points: engine.body().rows().map(|i| point(engine.present().get(i))).collect(),
-        colors: engine.body().rows().map(|i| colour(engine.roles()[i])).collect(),
         ..Marker::default()
     };
-    let mut all = vec![particles];
-    if engine.flock().neighbours.index.len() <= MOST_BONDS {
-        all.push(bonds(engine, header, 0.08 * spacing));
+    (particles.points, particles.colors) = all.map(|(place, role)| (point(place), colour(role))).unzip();
+    let mut markers = vec![particles];
+    if engine.parted().is_none() && engine.flock().neighbours.index.len() <= MOST_BONDS {
+        markers.push(bonds(engine, header, 0.08 * spacing));
     }
-    MarkerArray { markers: all }
+    MarkerArray { markers }
 }
 
 /// Every bond that lives.
@@ -146,9 +164,12 @@ fn bonds(engine: &Engine, header: &Header, width: f64) -> Marker {
 }
 
 fn state(engine: &Engine, name: &str, header: Header) -> FormationState {
-    let body: Vec<usize> = engine.body().rows().filter(|&i| engine.roles()[i].is_body()).collect();
+    let (owned, is_whole) = (engine.body().owned(), engine.parted().is_none());
+    let is_of_body = |&i: &usize| owned.contains(&i) && engine.roles()[i].is_body();
+    let body: Vec<usize> = engine.body().rows().filter(is_of_body).collect();
     let strains: Vec<Option<Strain>> = body.iter().map(|&i| engine.strain(i)).collect();
-    let members = body.iter().zip(&strains).filter(|_| body.len() <= MOST_MEMBERS);
+    let members = body.iter().zip(&strains).filter(|_| is_whole && body.len() <= MOST_MEMBERS);
+    let own_strain = strains.iter().flatten().map(Strain::largest).fold(0.0, f64::max);
     FormationState {
         header,
         formation: name.to_owned(),
@@ -156,8 +177,8 @@ fn state(engine: &Engine, name: &str, header: Header) -> FormationState {
         mode: FormationState::RUNNING,
         formation_error: f64::NAN,
         clearance: f64::INFINITY,
-        pe1_sum: body.iter().map(|&i| engine.pe1(i)).sum(),
-        strain_max: strains.iter().flatten().map(Strain::largest).fold(0.0, f64::max),
+        pe1_sum: engine.energies()[0],
+        strain_max: engine.largest_of_parts([own_strain])[0],
         elapsed: 0.0,
         members: members.map(|(&i, strain)| member(engine, i, *strain)).collect(),
     }

@@ -36,25 +36,46 @@ impl Positions {
     }
 
     /// Shows the body as it is. Never waits, and never fails: what readers that hold too much leave no room for is
-    /// left out and counted.
-    pub fn show(&mut self, engine: &Engine) {
-        let step = engine.step();
+    /// left out and counted. Where ranks have a part of the body each, all of them call this, and the first one alone has something to
+    /// show it by: it receives the particles of the others where there is a reader.
+    pub fn show(shown: Option<&mut Self>, engine: &Engine) {
+        let (present, roles, body) = (engine.present(), engine.roles(), engine.body());
+        let seen = |i: usize| Particle {
+            id: body.id(i) as u32,
+            role: roles[i].number().into(),
+            position: [present.x[i], present.y[i]],
+        };
+        let mut shown = shown.filter(|shown| shown.is_read(engine.step()));
+        if !engine.any_of_parts(shown.is_some()) {
+            return;
+        }
+        if let (None, Some(shown)) = (engine.parted(), &mut shown) {
+            // Straight into shared memory.
+            return shown.send(engine, present.len(), |row| seen(body.in_row(row)));
+        }
+        let all = engine.of_all(|i| {
+            let Particle { id, role, position: [x, y] } = seen(i);
+            [u64::from(id), u64::from(role), x.to_bits(), y.to_bits()]
+        });
+        let of_words = |[id, role, x, y]: [u64; 4]| {
+            let position = [x, y].map(f64::from_bits);
+            Particle { id: id as u32, role: role as u32, position }
+        };
+        if let Some(shown) = shown {
+            shown.send(engine, all.len(), |row| of_words(all[row]));
+        }
+    }
+
+    /// Whether there is a reader.
+    fn is_read(&self, step: usize) -> bool {
         if step.is_multiple_of(CLEANING) {
             self.peer.clean_up();
         }
-        if self.writer.readers() == 0 {
-            return;
-        }
-        let (present, roles, body) = (engine.present(), engine.roles(), engine.body());
-        let particle = |row: usize| {
-            let i = body.in_row(row);
-            Particle {
-                id: body.id(i) as u32,
-                role: roles[i].number().into(),
-                position: [present.x[i], present.y[i]],
-            }
-        };
-        if let Err(error) = self.writer.send(system_time(), step as u64, present.len(), particle) {
+        self.writer.readers() > 0
+    }
+
+    fn send(&mut self, engine: &Engine, count: usize, particle: impl FnMut(usize) -> Particle) {
+        if let Err(error) = self.writer.send(system_time(), engine.step() as u64, count, particle) {
             if self.unsent == 0 {
                 tracing::debug!("{error} (only the first is reported)");
             }

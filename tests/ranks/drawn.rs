@@ -1,6 +1,7 @@
-//! Figures of a body in parts are, to the byte, those of one laid out as a whole.
+//! Figures and recordings of a body in parts are, to the byte, those of one laid out as a whole.
 
 use std::ops::ControlFlow;
+use std::sync::mpsc;
 
 use flockform::continuum::equilibrium::run_to_equilibrium_shared;
 use flockform::continuum::parts::laid_out_whole_for;
@@ -9,7 +10,9 @@ use flockform::engine::Engine;
 use flockform::engine::observer::Observer;
 use flockform::export::Drawn;
 use flockform::export::figures::is_raster;
+use flockform::messages::recorder::{RecordSink, RecordedMessage};
 use flockform::ranks::Team;
+use flockform::record::body::BodyMessages;
 use flockform::scene::Scene;
 
 use super::on_ranks;
@@ -64,6 +67,50 @@ fn drawn(scene: &Scene, team: Option<&Team>) -> Vec<Drawn> {
     let outcome = run_to_equilibrium_shared(scene, plan, None, team, &mut drawer).expect("can be shared");
     drawer.1.extend(Drawn::of(scene, &outcome.engine));
     drawer.1
+}
+
+/// Topics and payloads of the messages that a run is recorded in.
+fn recorded(scene: &Scene, team: Option<&Team>) -> Vec<(String, Vec<u8>)> {
+    struct Watch(BodyMessages);
+    impl Observer for Watch {
+        fn next(&mut self, step: usize) -> usize {
+            self.0.next(step)
+        }
+
+        fn see(&mut self, engine: &Engine, residual: f64) -> ControlFlow<()> {
+            self.0.step(engine, residual);
+            ControlFlow::Continue(())
+        }
+    }
+    let (sent, taken) = mpsc::channel();
+    let sink = move |message: &RecordedMessage<'_>| {
+        sent.send((message.topic.to_owned(), message.payload.to_vec())).expect("taken");
+    };
+    let sink = team.is_none_or(Team::is_first).then(|| Box::new(sink) as RecordSink);
+    let plan = team.map_or_else(|| planned(scene), |team| Plan::of_part(scene, team).expect("fits"));
+    let mut watch = Watch(BodyMessages::new(scene, sink).expect("its names are valid"));
+    let outcome = run_to_equilibrium_shared(scene, plan, None, team, &mut watch).expect("can be shared");
+    watch.0.finish(&outcome.engine, outcome.residual);
+    taken.iter().collect()
+}
+
+#[test]
+fn a_body_in_parts_is_recorded_by_the_first_rank_as_one_alone() {
+    let every = "record.vtk_every=2";
+    let fitted = [every, "body.outline=\"fitted\""];
+    let torn =
+        [every, "rule.mean={kind=\"barycentre\"}", "neighbours={kind=\"second\"}", "fracture={stretch=1.1}"];
+    for sets in [&fitted[..], &torn] {
+        let scene = plate(LARGE, sets);
+        let expected = recorded(&scene, None);
+        // At rest, after steps 2 and 4 and in the end, on four topics.
+        assert_eq!(expected.len(), 16, "{sets:?}");
+        for ranks in [2, 5] {
+            let found = on_ranks(ranks, |team| recorded(&scene, Some(&team)));
+            assert!(found[0] == expected, "{sets:?} on {ranks} ranks");
+            assert!(found[1..].iter().all(Vec::is_empty));
+        }
+    }
 }
 
 #[test]

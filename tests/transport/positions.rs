@@ -29,7 +29,7 @@ fn a_reader_sees_every_step_of_the_body_to_the_bit() {
     let reader = read(&peer, "body").expect("a reader");
     for step in 1..=50 {
         engine.advance();
-        shown.show(&engine);
+        Positions::show(Some(&mut shown), &engine);
         let slice = reader.take().expect("the step");
         assert_eq!((slice.header().step, slice.len()), (step, engine.present().len()));
         for (i, particle) in slice.iter().enumerate() {
@@ -54,7 +54,7 @@ fn a_body_given_as_points_is_shown_by_its_ids_and_in_the_order_of_its_file() {
     let peer = domain(&name).join("test").expect("shared memory");
     let mut shown = open(&name, &engine);
     let reader = read(&peer, "body").expect("a reader");
-    shown.show(&engine);
+    Positions::show(Some(&mut shown), &engine);
     let slice = reader.take().expect("the step");
     let seen: Vec<(u32, [f64; 2])> = slice.iter().map(|one| (one.id, one.position)).collect();
     assert_eq!(seen, rows);
@@ -70,7 +70,7 @@ fn a_reader_that_never_reads_loses_all_but_the_newest_and_holds_nobody_up() {
     let elsewhere = Process::start("never read positions", &name);
     for _ in 0..2000 {
         engine.advance();
-        shown.show(&engine);
+        Positions::show(Some(&mut shown), &engine);
     }
     assert_eq!(shown.unsent(), 0);
     assert_eq!(reader.take().expect("the newest").header().step, 2000);
@@ -93,13 +93,13 @@ fn a_reader_that_is_killed_while_it_holds_steps_takes_nothing_from_the_run() {
         });
         while is_done.try_recv().is_err() && !reader.is_finished() {
             engine.advance();
-            shown.show(&engine);
+            Positions::show(Some(&mut shown), &engine);
             std::thread::sleep(Duration::from_millis(1));
         }
         reader.join().expect("it started").kill();
         for _ in 0..500 {
             engine.advance();
-            shown.show(&engine);
+            Positions::show(Some(&mut shown), &engine);
         }
     }
     assert_eq!(shown.unsent(), 0);

@@ -17,7 +17,8 @@ use crate::cli::progress::Progress;
 /// Records, publications, progress, checkpoints, and the interrupt that ends them.
 pub struct RunObserver<'a> {
     pub recorder: Recorder<'a>,
-    /// Positions shown to other processes.
+    /// Whether positions are shown to other processes, and what the rank that writes shows them by.
+    pub is_shown: bool,
     pub shown: Option<Positions>,
     pub messages: Option<BodyMessages>,
     pub progress: Progress,
@@ -30,13 +31,14 @@ pub struct RunObserver<'a> {
 
 impl Observer for RunObserver<'_> {
     fn next(&mut self, step: usize) -> usize {
-        self.looks.next(step).min(self.recorder.next(step))
+        let message = self.messages.as_ref().map_or(usize::MAX, |messages| messages.next(step));
+        self.looks.next(step).min(self.recorder.next(step)).min(message)
     }
 
     fn see(&mut self, engine: &Engine, residual: f64) -> ControlFlow<()> {
         self.recorder.step(engine);
-        if let Some(shown) = &mut self.shown {
-            shown.show(engine);
+        if self.is_shown {
+            Positions::show(self.shown.as_mut(), engine);
         }
         if let Some(messages) = &mut self.messages {
             messages.step(engine, residual);

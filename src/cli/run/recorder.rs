@@ -30,8 +30,6 @@ pub struct Recorder<'a> {
     /// Of the rank that writes.
     frames: Option<VtkSeries>,
     outputs: Outputs,
-    /// Whether there shall be a film.
-    films: bool,
     /// Values that report and film show.
     pub animation: Option<RunRecorder>,
     /// The state that an earlier run saved for it.
@@ -59,7 +57,7 @@ impl<'a> Recorder<'a> {
         plan: &Plan,
         folder: Option<&OutputFolder>,
         left: Option<&ResumedRun>,
-        (outputs, films): (Outputs, bool),
+        outputs: Outputs,
     ) -> Result<Self, ExportError> {
         // A body that is not stepped has no history.
         let is_solved_at_once = scene.is_solved_at_once();
@@ -80,7 +78,6 @@ impl<'a> Recorder<'a> {
             load_steps: left.map_or_else(Vec::new, |left| left.checkpoint.load_steps.to_vec()),
             frames,
             outputs,
-            films,
             animation: None,
             animation_state: left.and_then(|left| left.checkpoint.animation.clone()),
             failure: None,
@@ -91,9 +88,9 @@ impl<'a> Recorder<'a> {
     /// For a checkpoint.
     pub fn kept(&mut self, engine: &Engine) -> Recorded<'_> {
         self.receive_probes(engine);
-        if self.keeps_frames() {
+        if self.outputs.keeps_frames() {
             // A run that was just resumed has not yet looked at a step, and still has the frames of before.
-            RunRecorder::open(&mut self.animation, &mut self.animation_state, (self.scene, engine));
+            self.open_animation(engine);
         }
         Recorded {
             snapshots: &self.snapshots,
@@ -119,10 +116,9 @@ impl<'a> Recorder<'a> {
         if self.is_frame(engine.step()) {
             self.write_frame(engine);
         }
-        if self.keeps_frames() {
+        if self.outputs.keeps_frames() {
             let start = Instant::now();
-            RunRecorder::open(&mut self.animation, &mut self.animation_state, (self.scene, engine))
-                .watch(engine);
+            self.open_animation(engine).watch(engine);
             self.writing += start.elapsed();
         }
     }
@@ -136,13 +132,15 @@ impl<'a> Recorder<'a> {
         let load = load_every(self.scene).map(next);
         // The report has yet to say what it wants: the next one.
         let animation = self
+            .outputs
             .keeps_frames()
             .then(|| self.animation.as_ref().map_or(step + 1, |animation| animation.next(step)));
         [figure, vtk, load, animation].into_iter().flatten().min().unwrap_or(usize::MAX)
     }
 
-    fn keeps_frames(&self) -> bool {
-        self.outputs.report || self.films
+    fn open_animation(&mut self, engine: &Engine) -> &mut RunRecorder {
+        let of = (self.scene, engine, self.outputs.film);
+        RunRecorder::open(&mut self.animation, &mut self.animation_state, of)
     }
 
     /// Keeps the configuration for its figures, or draws them now.
@@ -214,9 +212,9 @@ impl<'a> Recorder<'a> {
             self.failure = frames.finish().err();
         }
         let start = Instant::now();
-        if self.keeps_frames() {
+        if self.outputs.keeps_frames() {
             // A run that is gone on with from its last step has seen none.
-            RunRecorder::open(&mut self.animation, &mut self.animation_state, (self.scene, engine));
+            self.open_animation(engine);
         }
         if let Some(animation) = &mut self.animation {
             animation.close(self.scene, outcome);
@@ -225,8 +223,8 @@ impl<'a> Recorder<'a> {
         let animation = self.animation.as_mut().filter(|_| is_written);
         let stage = animation.map(|animation| animation.stage(self.scene, outcome));
         let writing = self.writing + start.elapsed();
-        let Self { snapshots, drawn, probes, load_steps, animation, films, failure, .. } = self;
-        let animation = animation.filter(|_| films);
+        let Self { snapshots, drawn, probes, load_steps, animation, outputs, failure, .. } = self;
+        let animation = animation.filter(|_| outputs.film);
         // The others take the last frame of the report together with a rank that could not write its own.
         let records = Records { snapshots, drawn, probes, load_steps, stage, animation, writing };
         failure.map_or(Ok(records), Err)
@@ -254,8 +252,7 @@ mod tests {
     fn a_recorder_that_has_not_yet_looked_at_a_step_keeps_the_frames_of_before() {
         let scene = bundled("tension").expect("bundled").load(&[]).expect("valid");
         let plan = || Plan::new(&scene).expect("can be laid out");
-        let recorder =
-            || Recorder::new(&scene, &plan(), None, None, (Outputs::ALL, false)).expect("writes nothing");
+        let recorder = || Recorder::new(&scene, &plan(), None, None, Outputs::ALL).expect("writes nothing");
         let mut first = recorder();
         let outcome = run(plan(), &mut |engine, _| {
             first.step(engine);

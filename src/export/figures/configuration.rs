@@ -139,7 +139,7 @@ impl Setting {
     fn heading(&self, subject: &Subject<'_>, mut note: String, is_field: bool) -> Heading {
         let style = Style::of(subject, is_field);
         if style == Style::Raster {
-            note += &format!("; {} particles drawn as squares", subject.body.total());
+            note += &format!("; {} particles drawn as squares", subject.total);
         }
         // Surfaces and squares have the colours of the field alone.
         let legend = match style {

@@ -64,6 +64,8 @@ pub struct Subject<'a> {
     pub unit: &'a str,
     /// The particles at rest.
     pub body: &'a Body,
+    /// How many there are in all parts of the body, or in the one that these are a sample of.
+    pub total: usize,
     /// The bonds of the body; `None` where neighbours are found anew at every step.
     pub neighbours: Option<&'a Neighbours>,
     /// Between the particles, where the scene has a material.
@@ -85,6 +87,7 @@ impl<'a> Subject<'a> {
             title: &scene.raw.title,
             unit: scene.unit(),
             body: engine.body(),
+            total: engine.body().total(),
             neighbours: engine.lasting_neighbours(),
             cells: engine.cells(),
             changes: engine.changes(),
@@ -96,7 +99,7 @@ impl<'a> Subject<'a> {
 
     /// Whether its particles are too many for each to be seen.
     fn is_raster(&self) -> bool {
-        is_raster(self.body.total())
+        is_raster(self.total)
     }
 
     /// The particles of this part, of a whole body all, that are matter.

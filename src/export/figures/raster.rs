@@ -51,16 +51,13 @@ impl Raster {
     /// What fell onto the sheets of all ranks, for the first one, where each lets its own part of a body fall.
     pub fn of_all(mut self, team: Option<&Team>) -> Self {
         let Some(team) = team else { return self };
-        if !team.is_first() {
-            team.send_bytes(&postcard::to_stdvec(&self.largest).expect("numbers can be written"));
-            return self;
-        }
-        for rank in 1..team.count() {
-            let theirs: Vec<Option<f64>> =
-                postcard::from_bytes(&team.receive_bytes(rank)).expect("as they were sent");
+        let sent =
+            (!team.is_first()).then(|| postcard::to_stdvec(&self.largest).expect("numbers can be written"));
+        team.bring(sent, |theirs| {
+            let theirs: Vec<Option<f64>> = postcard::from_bytes(theirs).expect("as they were sent");
             let fell = theirs.into_iter().enumerate().filter_map(|(square, value)| Some((square, value?)));
             fell.for_each(|(square, value)| self.keep(square, value));
-        }
+        });
         self
     }
 

@@ -1,6 +1,6 @@
 //! The film of a run: its configurations, coloured by a quantity.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
@@ -12,8 +12,9 @@ use crate::engine::Engine;
 use crate::export::figures::configuration::{Setting, configuration_in};
 use crate::export::figures::{Subject, displaced, page};
 use crate::export::largest_strain;
-use crate::export::report::RunRecorder;
 use crate::export::report::recorder::{PE1, PE2, STRAIN, VON_MISES, is_linear};
+use crate::export::report::{RunRecorder, Sample};
+use crate::flock::body::Body;
 use crate::flock::pseudo_energy::pe1_among;
 use crate::flock::strain::strain_among;
 use crate::flock::vectors::Vectors;
@@ -51,7 +52,7 @@ pub fn film<'a>(
     let frames = chosen(recorder.frames().len());
     let shown = Shown::new(scene, &outcome.engine, recorder, colour);
     let mut setting = Setting::of_film();
-    let subject = Subject::of(scene, &outcome.engine);
+    let subject = shown.subject();
     for &frame in &frames {
         let (snapshot, values) = (shown.snapshot(frame), shown.values(frame));
         setting.include(&subject, &snapshot, values.as_deref());
@@ -65,6 +66,7 @@ pub fn film<'a>(
         let frame = frames[n];
         let (snapshot, values) = (shown.snapshot(frame), shown.values(frame));
         let field = scale.as_ref().zip(values.as_deref()).map(|(scale, values)| scale.field(values));
+        let subject = shown.subject();
         let note = shown.note(&subject, frame);
         configuration_in(&setting, &subject, &snapshot, note, field.as_ref())
     };
@@ -77,6 +79,8 @@ struct Shown<'a> {
     engine: &'a Engine,
     recorder: &'a RunRecorder,
     colour: FilmColour,
+    /// The particles that are shown, of a body in parts.
+    sample: Option<(&'a Sample, Body)>,
     /// Of the body at the end, where strains are computed from the frames \[1\].
     largest_strain: Option<f64>,
 }
@@ -91,12 +95,24 @@ impl<'a> Shown<'a> {
         };
         let is_computed = quantity.is_some_and(|quantity| !recorder.keeps(quantity));
         let largest_strain = is_computed.then(|| largest_strain(engine)).flatten();
-        Self { scene, engine, recorder, colour, largest_strain }
+        let sample = recorder.sample().map(|sample| (sample, sample.body(engine.body().lattice.spacing())));
+        Self { scene, engine, recorder, colour, sample, largest_strain }
     }
 
-    /// As it was kept; at the end as it is.
+    /// Of a body in parts its sample, without bonds, cells and roles of single components.
+    fn subject(&self) -> Subject<'_> {
+        let all = Subject::of(self.scene, self.engine);
+        match &self.sample {
+            None => all,
+            Some((_, body)) => {
+                Subject { body, neighbours: None, cells: None, changes: &[], team: None, ..all }
+            }
+        }
+    }
+
+    /// As it was kept; at the end as it is, but for a sample.
     fn displacement(&self, frame: usize) -> Vectors {
-        if frame + 1 == self.recorder.frames().len() {
+        if frame + 1 == self.recorder.frames().len() && self.sample.is_none() {
             return self.engine.displacements();
         }
         let tracks = &self.recorder.frames()[frame].tracks;
@@ -108,12 +124,24 @@ impl<'a> Shown<'a> {
         let step = self.recorder.frames()[frame].step;
         Snapshot {
             step,
-            positions: displaced(&self.engine.body().reference, &self.displacement(frame), 1.0),
+            positions: displaced(&self.subject().body.reference, &self.displacement(frame), 1.0),
             roles: self.recorder.roles_at(step),
             pe1: Vec::new(),
             pe2: Vec::new(),
-            broken: self.broken(frame),
+            broken: self.broken_shown(frame),
         }
+    }
+
+    /// Broken bonds by the particles that are shown: of a sample those with both or either end in it.
+    fn broken_shown(&self, frame: usize) -> Vec<[u32; 2]> {
+        let broken = self.broken(frame);
+        let Some((sample, _)) = &self.sample else { return broken };
+        let shown: HashMap<u32, u32> = sample.ids.iter().copied().zip(0..).collect();
+        let ends = broken.into_iter().filter_map(|pair| {
+            let [a, b] = pair.map(|index| shown.get(&(index + 1)).copied());
+            Some([a.or(b)?, b.or(a)?])
+        });
+        ends.collect()
     }
 
     fn broken(&self, frame: usize) -> Vec<[u32; 2]> {
@@ -254,7 +282,7 @@ mod tests {
         let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
         let mut recorder = None;
         let mut see = |engine: &Engine, _: f64| {
-            RunRecorder::open(&mut recorder, &mut None, (&scene, engine)).watch(engine);
+            RunRecorder::open(&mut recorder, &mut None, (&scene, engine, false)).watch(engine);
             ControlFlow::Continue(())
         };
         let outcome = run_to_equilibrium_watched(&scene, plan, &mut EachStep(&mut see)).expect("an end");

@@ -29,6 +29,7 @@ pub mod view;
 #[cfg(feature = "swarm")]
 pub use flight::FlightRecorder;
 pub use recorder::{AnimationState, RunRecorder};
+pub(in crate::export) use sample::Sample;
 
 use encode::EncodedFrames;
 use frames::Frames;

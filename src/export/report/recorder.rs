@@ -18,10 +18,13 @@ use crate::continuum::plan::Plan;
 use crate::continuum::run::Outcome;
 use crate::engine::Engine;
 use crate::engine::serde_impls;
+use crate::export::figures::displaced;
 use crate::flock::action::ActionKind;
+use crate::flock::pseudo_energy::pe1;
 use crate::flock::role::Role;
 use crate::flock::rules::{Mean, Rotation};
-use crate::flock::strain::Strain;
+use crate::flock::strain::{Strain, strain};
+use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 use crate::material::elastic::{Constants, Plane};
 use crate::material::stress::StressState;
@@ -36,7 +39,7 @@ const MOST_FINE: usize = 100_000;
 /// Most particles whose final values are written exactly: those of more would fill the page.
 const MOST_EXACT: usize = 250_000;
 /// Frames of a body whose equilibrium was solved for, on its way from no load to all of it.
-const LOAD_FRAMES: usize = 20;
+pub(super) const LOAD_FRAMES: usize = 20;
 
 pub(in crate::export) const PE1: &str = "pe1";
 pub(in crate::export) const PE2: &str = "pe2";
@@ -85,8 +88,8 @@ pub(in crate::export) struct Packed {
     pub text: usize,
 }
 
-/// Memory that the report of a run takes, before it begins.
-pub(in crate::export) fn packed(scene: &Scene, plan: &Plan) -> Packed {
+/// Memory that the report of a run takes, before it begins; of a body in parts for a film too, if there shall be one.
+pub(in crate::export) fn packed(scene: &Scene, plan: &Plan, films: bool) -> Packed {
     /// Bytes of a particle's place and neighbours as text: rows of a lattice are next to nothing.
     const TEXT: usize = 6;
     /// Bytes of its numbers at the end as text; where nothing has come yet, they are next to nothing too.
@@ -95,13 +98,12 @@ pub(in crate::export) fn packed(scene: &Scene, plan: &Plan) -> Packed {
     /// Bytes of frames that one of their text stands for: three of a body that moves everywhere, many of one mostly at rest.
     const COMPRESSED: usize = 6;
     let (total, is_sample) = (plan.setup.body.total(), plan.setup.body.part.is_some());
-    let count = if is_sample { sample::size_of(total) } else { total };
+    let count = if is_sample { sample::size_of(total, films) } else { total };
     let are_neighbours_known = !is_sample && plan.setup.present_radius.is_none();
     let frames = Frames::new(count, channels(scene, total, are_neighbours_known, plan.setup.cells.is_some()));
-    let steps = match (&scene.load_steps, scene.is_solved_at_once(), is_sample) {
-        (Some(LoadSteps::Solved(parts)), ..) => parts.len(),
-        (_, true, true) => 0,
-        (_, true, false) => LOAD_FRAMES,
+    let steps = match (&scene.load_steps, scene.is_solved_at_once()) {
+        (Some(LoadSteps::Solved(parts)), _) => parts.len(),
+        (_, true) => LOAD_FRAMES,
         _ => plan.stop.steps,
     };
     let is_exact = !is_sample && count <= MOST_EXACT;
@@ -137,8 +139,8 @@ pub struct RunRecorder {
 
 impl RunRecorder {
     /// From the engine before its first step.
-    fn new(scene: &Scene, engine: &Engine) -> Self {
-        let sample = Sample::of(engine);
+    fn new(scene: &Scene, engine: &Engine, films: bool) -> Self {
+        let sample = Sample::of(engine, films);
         let count = sample.as_ref().map_or(engine.body().count(), Sample::count);
         let are_neighbours_known = sample.is_none() && engine.lasting_neighbours().is_some();
         let channels = channels(scene, engine.body().total(), are_neighbours_known, engine.cells().is_some());
@@ -150,13 +152,14 @@ impl RunRecorder {
         Self { frames, first_roles, roles, changes, is_solved, is_recovered, sample }
     }
 
-    /// The recorder, made if there is none yet; it goes on from the state of an earlier one that showed the same particles.
+    /// The recorder, made if there is none yet, for a film too if there shall be one; it goes on from the state of an earlier one
+    /// that showed the same particles.
     pub fn open<'a>(
         recorder: &'a mut Option<Self>,
         earlier: &mut Option<AnimationState<'_>>,
-        (scene, engine): (&Scene, &Engine),
+        (scene, engine, films): (&Scene, &Engine, bool),
     ) -> &'a mut Self {
-        let recorder = recorder.get_or_insert_with(|| Self::new(scene, engine));
+        let recorder = recorder.get_or_insert_with(|| Self::new(scene, engine, films));
         let are_of_these = |earlier: &AnimationState<'_>| {
             earlier.stride == recorder.stride() && recorder.frames.are_of_these(&earlier.frames)
         };
@@ -181,7 +184,13 @@ impl RunRecorder {
                 true => von_mises(engine, 1.0),
                 false => Stresses::von_mises_of_cells(engine),
             };
-            let seen = Seen { engine, sample: self.sample.as_ref(), part: 1.0, stress: &stress };
+            let seen = Seen {
+                engine,
+                sample: self.sample.as_ref(),
+                part: 1.0,
+                places: engine.present(),
+                stress: &stress,
+            };
             self.frames.keep(engine.step(), |_, channel| seen.values(channel).into());
             self.take_roles(engine);
         }
@@ -218,21 +227,28 @@ impl RunRecorder {
                 channels.retain(|channel| channel.name != VON_MISES);
             }
             self.frames = Frames::new(self.frames.count, channels);
-            // What the page does not compute is known of the whole load.
-            let first = if self.sample.is_some() { LOAD_FRAMES } else { 0 };
-            let whole = OnceCell::new();
-            for frame in first..=LOAD_FRAMES {
+            let (whole, displacements) = (OnceCell::new(), engine.displacements());
+            for frame in 0..=LOAD_FRAMES {
                 let part = frame as f64 / LOAD_FRAMES as f64;
+                let of_sample = self.sample.as_ref();
+                let under = of_sample.map(|_| displaced(&engine.body().reference, &displacements, part));
+                let places = under.as_ref().unwrap_or(engine.present());
                 let stress = || match is_linear(scene) {
                     false => von_mises(engine, part),
                     true => whole.get_or_init(|| von_mises(engine, 1.0)).iter().map(|v| part * v).collect(),
                 };
-                let seen = Seen { engine, sample: self.sample.as_ref(), part, stress: &stress };
+                let seen = Seen { engine, sample: of_sample, part, places, stress: &stress };
                 self.frames.keep(frame, |_, channel| seen.values(channel).into());
             }
         } else {
             let stress = || von_mises(engine, 1.0);
-            let seen = Seen { engine, sample: self.sample.as_ref(), part: 1.0, stress: &stress };
+            let seen = Seen {
+                engine,
+                sample: self.sample.as_ref(),
+                part: 1.0,
+                places: engine.present(),
+                stress: &stress,
+            };
             self.frames.keep_last(engine.step(), |_, channel| seen.values(channel).into());
         }
         self.take_roles(engine);
@@ -268,8 +284,8 @@ impl RunRecorder {
         self.sample.is_none() && self.frames.count <= MOST_EXACT
     }
 
-    #[cfg(test)]
-    pub(super) fn sample(&self) -> Option<&Sample> {
+    /// The particles that are shown, of a body in parts.
+    pub(in crate::export) fn sample(&self) -> Option<&Sample> {
         self.sample.as_ref()
     }
 
@@ -311,7 +327,7 @@ impl RunRecorder {
     /// A body as it is, in a single frame.
     #[cfg(feature = "live")]
     pub(crate) fn still(scene: &Scene, engine: &Engine) -> View {
-        let mut recorder = Self::new(scene, engine);
+        let mut recorder = Self::new(scene, engine, false);
         recorder.finish(scene, engine, false);
         recorder.view(scene, engine, false, false)
     }
@@ -366,22 +382,23 @@ impl RunRecorder {
 struct Seen<'a> {
     engine: &'a Engine,
     sample: Option<&'a Sample>,
-    /// The part of the displacements that is shown.
+    /// The part of the displacements that is shown, and where particles are then.
     part: f64,
+    places: &'a Vectors,
     stress: &'a dyn Fn() -> Vec<f64>,
 }
 
 impl Seen<'_> {
     /// Values of a channel, shape \[count\].
     fn values(&self, channel: &Channel) -> Vec<f64> {
-        let Self { engine, part, .. } = *self;
-        let (present, reference) = (engine.present(), &engine.body().reference);
+        let Self { engine, part, places, .. } = *self;
+        let (present, reference, flock) = (engine.present(), &engine.body().reference, engine.flock());
         match channel.name {
             "dx" => self.each(|i| part * (present.x[i] - reference.x[i])),
             "dy" => self.each(|i| part * (present.y[i] - reference.y[i])),
-            PE1 => self.each(|i| engine.pe1(i)),
+            PE1 => self.each(|i| pe1(flock, i, places)),
             PE2 => self.each(|i| engine.pe2(i)),
-            STRAIN => self.each(|i| engine.strain(i).map_or(f64::NAN, |strain| strain.largest())),
+            STRAIN => self.each(|i| strain(flock, i, places).map_or(f64::NAN, |strain| strain.largest())),
             _ => {
                 let stress = (self.stress)();
                 self.each(|i| stress.get(i).copied().unwrap_or(f64::NAN))

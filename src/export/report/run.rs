@@ -9,7 +9,6 @@ use super::super::{OutputFolder, Results, Signed, Summary};
 use super::frames::{Channel, MOST_FRAMES};
 use super::page::{Page, file_texts, number};
 use super::recorder::{STRAIN, is_solved_at_once};
-use super::sample::stride_of;
 use super::view::{Animation, View};
 use crate::continuum::run::{Outcome, StopReason};
 use crate::scene::Scene;
@@ -65,9 +64,7 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
     let bits = animation.channels.first().map_or(0, |channel| channel.bits);
     let body = outcome.engine.body();
     let is_sample = body.part.is_some();
-    let mut note = if is_solved && is_sample {
-        "Solved for its rest, not stepped: the rest alone is shown.".to_owned()
-    } else if is_solved {
+    let mut note = if is_solved {
         let meaning = match animation.linear {
             true => ", as under a load that grows evenly",
             false => "; the last alone is an equilibrium, and [load_steps] shows others",
@@ -105,7 +102,7 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
             " Ranks had a part of the body each: {} of its {} particles are shown, one of {} along either axis of the lattice, without bonds and cells. All values are kept to {bits} bits of each frame's range, or fewer.",
             animation.count,
             body.total(),
-            stride_of(body.total()),
+            animation.spacing / body.lattice.spacing(),
         );
         return note + before_the_last + " final.csv has all of them, to the last digit.";
     }

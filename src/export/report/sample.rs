@@ -1,4 +1,5 @@
-//! The particles that a report shows of a body of which each rank has a part: as many as a page and the first rank can hold.
+//! The particles that a report and a film show of a body of which each rank has a part: as many as a page and the first rank can
+//! hold.
 
 use rayon::prelude::*;
 
@@ -7,13 +8,13 @@ use crate::flock::body::Body;
 use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
 
-/// Most particles of a sample, but for some along an outline.
-const MOST: usize = 20_000;
+/// Most particles of a sample, but for some along an outline: of a page, and of a film, whose pixels are as many.
+const MOST: [usize; 2] = [20_000, 240_000];
 
 /// Particles spread evenly over a body in parts; which they are does not depend on the number of ranks. The first rank receives
 /// their values.
 #[derive(Debug)]
-pub(super) struct Sample {
+pub(in crate::export) struct Sample {
     team: Team,
     /// Those of this part.
     own: Vec<usize>,
@@ -27,21 +28,22 @@ pub(super) struct Sample {
 }
 
 /// How many times as coarse as the body's the lattice is whose sites a sample takes.
-pub(super) fn stride_of(total: usize) -> usize {
-    let least = total.div_ceil(MOST).isqrt().max(1);
-    if least * least * MOST < total { least + 1 } else { least }
+fn stride_of(total: usize, films: bool) -> usize {
+    let most = MOST[usize::from(films)];
+    let least = total.div_ceil(most).isqrt().max(1);
+    if least * least * most < total { least + 1 } else { least }
 }
 
 /// Particles of a sample, at most or nearly so.
-pub(super) fn size_of(total: usize) -> usize {
-    total.div_ceil(stride_of(total).pow(2))
+pub(super) fn size_of(total: usize, films: bool) -> usize {
+    total.div_ceil(stride_of(total, films).pow(2))
 }
 
 impl Sample {
-    /// The sample of a body in parts; `None` of a whole one.
-    pub fn of(engine: &Engine) -> Option<Self> {
+    /// The sample of a body in parts, for a film or a page alone; `None` of a whole one.
+    pub fn of(engine: &Engine, films: bool) -> Option<Self> {
         let (body, team) = (engine.body(), engine.parted()?.clone());
-        let stride = stride_of(body.total());
+        let stride = stride_of(body.total(), films);
         let own = every(body, stride);
         let counts = team.each([own.len() as u64]).into_iter().map(|[count]| count as usize).collect();
         let sample = Self { team, own, counts, stride, reference: Vectors::default(), ids: Vec::new() };
@@ -57,6 +59,11 @@ impl Sample {
 
     pub fn stride(&self) -> usize {
         self.stride
+    }
+
+    /// The particles as a body, as many times as far apart as those of one with this `spacing` \[length\].
+    pub fn body(&self, spacing: f64) -> Body {
+        Body::of_places(self.reference.clone(), self.stride as f64 * spacing)
     }
 
     /// Whether this rank receives what all have.
@@ -97,7 +104,7 @@ mod tests {
     use std::ops::ControlFlow;
 
     use super::super::frames::Frame;
-    use super::super::recorder::{AnimationState, RunRecorder};
+    use super::super::recorder::{AnimationState, LOAD_FRAMES, RunRecorder};
     use super::*;
     use crate::continuum::equilibrium::{run_to_equilibrium_shared, run_to_equilibrium_watched};
     use crate::continuum::mechanics::Stresses;
@@ -142,7 +149,7 @@ mod tests {
             let plan = Plan::of_part(scene, &team).unwrap_or_else(|error| panic!("{error}"));
             let (mut recorder, mut left) = (None, left.cloned());
             let mut see = |engine: &Engine, _: f64| {
-                RunRecorder::open(&mut recorder, &mut left, (scene, engine)).watch(engine);
+                RunRecorder::open(&mut recorder, &mut left, (scene, engine, false)).watch(engine);
                 ControlFlow::Continue(())
             };
             let mut observer = EachStep(&mut see);
@@ -199,15 +206,17 @@ mod tests {
             let has_stresses = expected.values().all(|(_, stresses)| !stresses.is_empty());
             let last = first.frames().len() - 1;
             for (k, frame) in first.frames().iter().enumerate() {
-                // Of one that was solved for at once the last is shown alone.
-                let at = if k == last { END } else { frame.step };
+                // One that was solved for at once is shown on its way there, in proportion to the load.
+                let (is_solved, part) = (scene.is_solved_at_once(), frame.step as f64 / LOAD_FRAMES as f64);
+                let part = if is_solved { part } else { 1.0 };
+                let at = if is_solved || k == last { END } else { frame.step };
                 let (displaced, stresses) = &expected[&at];
                 let of = |channel: usize, all: &dyn Fn(usize) -> f64| {
                     let found = frame.tracks[channel].values();
                     assert_eq!(found.len(), sample.ids.len());
                     let quantum = f64::from(frame.tracks[channel].exponent).exp2();
                     for (&id, found) in sample.ids.iter().zip(found) {
-                        let expected = all(id as usize - 1);
+                        let expected = part * all(id as usize - 1);
                         let is_near = (found - expected).abs() <= 0.51 * quantum;
                         assert!(
                             is_near || (found.is_nan() && expected.is_nan()),
@@ -230,10 +239,12 @@ mod tests {
 
     #[test]
     fn a_sample_is_spread_evenly_and_of_few_particles_there_are_all() {
-        for total in [0, 1, MOST - 1, MOST, MOST + 1, 4 * MOST, 4 * MOST + 1, 1_000_000_000] {
-            let stride = stride_of(total);
-            assert!(stride == 1 || (stride - 1).pow(2) * MOST < total, "{total}: {stride}");
-            assert!(size_of(total) <= MOST && stride >= 1, "{total}: {stride}");
+        for (films, most) in [(false, MOST[0]), (true, MOST[1])] {
+            for total in [0, 1, most - 1, most, most + 1, 4 * most, 4 * most + 1, 1_000_000_000] {
+                let stride = stride_of(total, films);
+                assert!(stride == 1 || (stride - 1).pow(2) * most < total, "{total}: {stride}");
+                assert!(size_of(total, films) <= most && stride >= 1, "{total}: {stride}");
+            }
         }
         let grid = "body.shape={kind=\"grid\",columns=200,rows=102}";
         let first = recorded(&scene("tension", &[grid, "stop.steps=1", "frame=none"]), 3, None);
@@ -261,7 +272,7 @@ mod tests {
         let mut whole = None;
         let plan = Plan::new(&scene).expect("can be laid out");
         let mut see = |engine: &Engine, _: f64| {
-            RunRecorder::open(&mut whole, &mut None, (&scene, engine)).watch(engine);
+            RunRecorder::open(&mut whole, &mut None, (&scene, engine, false)).watch(engine);
             ControlFlow::Continue(())
         };
         run_to_equilibrium_watched(&scene, plan, &mut EachStep(&mut see)).expect("an end");
