@@ -18,7 +18,12 @@ use crate::sweep::Order;
 pub fn material(scene: &Scene) -> Result<MaterialReport, SceneError> {
     if let (Mean::Material { .. }, Some(elastic)) = (scene.mean, &scene.material) {
         let report = MaterialReport::of_material(&scene.lattice, elastic);
-        return report.map_err(|error| scene.refuse("material", error.to_string(), remedy(&error)));
+        let mut report =
+            report.map_err(|error| scene.refuse("material", error.to_string(), remedy(&error)))?;
+        if !scene.inclusions.is_empty() {
+            report.notes.push("this is [material]; inclusions of the scene are other materials".into());
+        }
+        return Ok(report);
     }
     if scene.is_of_points() {
         let message = "a body of points has no lattice: no particle's neighbours stand for all";

@@ -126,6 +126,8 @@ impl PartShares {
     pub fn facts(&self, bytes: [usize; 2], are_drawn: bool) -> Vec<(String, String)> {
         let (least, most) = (self.particles.iter().min(), self.particles.iter().max());
         let (least, most) = (least.copied().unwrap_or_default(), most.copied().unwrap_or_default());
+        let body = &self.largest.setup.body;
+        let around = body.count() - body.owned().len();
         let exchanged = match self.steps {
             _ if self.is_solved && !self.iterates_in_parts => {
                 "; each is given the whole matrix and solves for the whole body".to_owned()
@@ -138,11 +140,16 @@ impl PartShares {
                 )
             }
             0 => format!("; of others it receives {} bytes in each step", self.halo_bytes),
-            steps => format!("; of others it receives {} bytes before every {steps} steps", self.halo_bytes),
+            steps => format!(
+                "; of others it receives {} bytes before every {steps} steps, {} where a step is looked at",
+                self.halo_bytes,
+                PLACE * around
+            ),
         };
         let condition = if are_drawn { "" } else { "with --figures none " };
         let parts = format!(
-            "{condition}each rank lays out and holds its part alone, {least} to {most} particles{exchanged}"
+            "{condition}each rank lays out and holds its part alone, {least} to {most} particles and up to {around} around \
+             them{exchanged}"
         );
         let [all, tables] = bytes.map(readable_bytes);
         let memory = match are_drawn {

@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
 
 use super::threads::Threads;
@@ -75,12 +75,16 @@ impl Progress {
 /// in the waiting thread with the step and the residual, several times a second.
 ///
 /// # Errors
-/// What a signal raises (`KeyboardInterrupt`), what `callback` raises, and work that panicked.
+/// What a signal raises (`KeyboardInterrupt`), what `callback` raises, one that cannot be called, and work that panicked.
 pub(super) fn beside<T: Send + 'static>(
     py: Python<'_>,
     callback: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(&Progress) -> T + Send + 'static,
 ) -> PyResult<T> {
+    if callback.is_some_and(|callback| !callback.is_callable()) {
+        let message = "progress cannot be called: give a function of a step and a residual, or leave it out";
+        return Err(PyTypeError::new_err(message));
+    }
     let threads = Threads::taken()?;
     let progress = Arc::new(Progress::new());
     let (send, receive) = sync_channel(1);

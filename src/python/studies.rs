@@ -121,10 +121,10 @@ pub(super) struct Comparison {
     /// Centres of the cells in the reference configuration [length], float64, shape (cells, 2).
     #[pyo3(get)]
     cell_places: Py<PyArrayDyn<f64>>,
-    /// Von Mises stress by the rule's displacements [force / length^2], float64, shape (cells,).
+    /// Von Mises stress of the rule at the centres of the cells [force / length^2], float64, shape (cells,).
     #[pyo3(get)]
     von_mises_rule: Py<PyArrayDyn<f64>>,
-    /// The same by the true displacements, float64, shape (cells,).
+    /// The same of the finite elements, float64, shape (cells,).
     #[pyo3(get)]
     von_mises_truth: Py<PyArrayDyn<f64>>,
     /// The body at the end of the rule's run.

@@ -2,7 +2,7 @@
 
 use flockform::fem::Effort;
 use flockform::flock::rules::Rotation;
-use flockform::study::compare::measures::{Comparison, Sides};
+use flockform::study::compare::measures::{Comparison, Sides, von_mises};
 use flockform::study::compare::run::{SceneReference, reference_of};
 
 use crate::reference::beam_displacements;
@@ -17,12 +17,15 @@ fn distance_from_reference(name: &str, aspect: u32) -> Comparison {
     let (body, cells) = (&layout.body, layout.cells.as_ref().expect("has cells"));
     let follows: Vec<bool> = body.reference.x.iter().map(|&x| x > 10.5).collect();
     let known = beam_displacements(aspect, &body.reference);
+    let [of_truth, of_known] =
+        [&truth.displacement, &known].map(|u| von_mises(cells, &elastic, u, Rotation::Small));
     let sides = Sides {
         cells,
         elastic: &elastic,
         rotation: Rotation::Small,
         rule: &truth.displacement,
         truth: &known,
+        von_mises: [&of_truth, &of_known],
         follows: &follows,
     };
     let found = Comparison::of(&sides).expect("measures");
@@ -68,8 +71,9 @@ fn the_material_rule_led_by_the_truth_is_within_half_a_percent_of_it() {
         let found = errors(name, &[]);
         assert!(found[0] < displacement && found[1] < von_mises, "{name}: {found:?}");
     }
-    assert_errors("beam", &[], [0.0039, 0.0197], 3e-4);
-    assert_errors("beam-hexagonal", &[], [0.0039, 0.0239], 1e-3);
+    assert_errors("beam", &[], [0.0039, 0.0224], 3e-4);
+    // Stress is the same all over a triangle, which no bent body's is.
+    assert_errors("beam-hexagonal", &[], [0.0039, 0.0823], 1e-3);
 }
 
 #[test]
@@ -80,13 +84,13 @@ fn the_material_rule_under_its_load_is_within_two_percent_of_the_truth() {
 
 #[test]
 fn the_papers_rule_has_its_large_errors_whatever_the_neighbours() {
-    assert_errors("beam-paper", &[], [0.262, 0.74], 0.01);
-    assert_errors("beam-paper-ring", &[], [0.264, 0.76], 0.01);
-    assert_errors("beam-paper-second", &[], [0.264, 0.75], 0.01);
-    assert_errors("beam-paper-reduced", &[], [0.437, 1.450], 0.01);
-    assert_errors("beam-paper-hexagonal", &[], [0.235, 0.799], 0.01);
-    assert_errors("beam-paper-hexagonal-reduced", &[], [0.237, 0.770], 0.01);
-    for (name, von_mises) in [("beam-paper-5", 5.85), ("beam-paper-10", 12.37)] {
+    assert_errors("beam-paper", &[], [0.262, 0.758], 0.01);
+    assert_errors("beam-paper-ring", &[], [0.264, 0.773], 0.01);
+    assert_errors("beam-paper-second", &[], [0.264, 0.769], 0.01);
+    assert_errors("beam-paper-reduced", &[], [0.437, 1.464], 0.01);
+    assert_errors("beam-paper-hexagonal", &[], [0.235, 0.816], 0.01);
+    assert_errors("beam-paper-hexagonal-reduced", &[], [0.237, 0.787], 0.01);
+    for (name, von_mises) in [("beam-paper-5", 5.85), ("beam-paper-10", 12.36)] {
         let found = errors(name, &[]);
         assert!((found[1] - von_mises).abs() < 0.01, "{name}: {found:?}");
     }

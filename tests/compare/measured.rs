@@ -20,7 +20,9 @@ fn scaled(field: &Vectors, by: f64) -> Vectors {
 
 fn compare(cells: &Cells, rule: &Vectors, truth: &Vectors, follows: &[bool]) -> Comparison {
     let elastic = sheet(1000.0, 0.33, Plane::Stress);
-    Comparison::of(&Sides { cells, elastic: &elastic, rotation: Rotation::Small, rule, truth, follows })
+    let [of_rule, of_truth] = [rule, truth].map(|u| von_mises(cells, &elastic, u, Rotation::Small));
+    let (elastic, von_mises) = (&elastic, [&of_rule[..], &of_truth]);
+    Comparison::of(&Sides { cells, elastic, rotation: Rotation::Small, rule, truth, von_mises, follows })
         .expect("measures")
 }
 

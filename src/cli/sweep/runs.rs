@@ -184,7 +184,10 @@ impl Runs<'_> {
         };
         match ended {
             Ok(Ended { stop_reason: StopReason::Interrupted, .. }) => None,
-            Ok(Ended { stop_reason, outputs, cautions }) => {
+            Ok(Ended { stop_reason, outputs, mut cautions }) => {
+                let missing =
+                    outputs.iter().filter_map(|output| output.as_ref().err()).map(OutputError::to_string);
+                cautions.extend(missing.map(|error| error.lines().next().unwrap_or_default().to_owned()));
                 let outputs = outputs.into_iter().map(Result::unwrap_or_default).collect();
                 row(stop_reason.name(), outputs, stop_reason.fault().unwrap_or_default(), cautions)
             }

@@ -279,11 +279,11 @@ class Comparison:
 
     @property
     def von_mises_rule(self) -> NDArray[np.float64]:
-        """Von Mises stress by the rule's displacements [force / length^2], float64, shape (cells,)."""
+        """Von Mises stress of the rule at the centres of the cells [force / length^2], float64, shape (cells,)."""
 
     @property
     def von_mises_truth(self) -> NDArray[np.float64]:
-        """The same by the true displacements, float64, shape (cells,)."""
+        """The same of the finite elements, float64, shape (cells,)."""
 
     @property
     def body(self) -> Body:

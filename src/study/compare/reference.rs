@@ -141,8 +141,7 @@ impl Reference {
     }
 
     /// Stress \[force / length^2\] of the truth itself at places of the shape or less than a spacing outside
-    /// it, shape \[places\]; of a body that turns, in axes that turn with it. What a rule is measured against is coarser: the stress that the cells have if their
-    /// corners go where the truth takes them ([`super::measures::von_mises`]).
+    /// it, shape \[places\]; of a body that turns, in axes that turn with it.
     ///
     /// # Errors
     /// Names the first place further outside.

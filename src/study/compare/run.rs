@@ -16,7 +16,7 @@ use crate::continuum::plan::Plan;
 use crate::continuum::run::Outcome;
 use crate::engine::Engine;
 use crate::engine::setup::RoleChange;
-use crate::fem::{Effort, FemError};
+use crate::fem::{Effort, FemError, Stress};
 use crate::flock::role::Role;
 use crate::flock::rules::Rotation;
 use crate::flock::vectors::Vectors;
@@ -52,10 +52,9 @@ pub struct Compared {
     pub cells: Cells,
     /// Displacements by the rule \[length\], shape \[particles\]; the true ones are the truth's.
     pub rule: Vectors,
-    /// At the centres of the cells, the corners displaced by the rule and in truth
-    /// \[force / length^2\], shape \[cells\].
+    /// Stress at the centres of the cells \[force / length^2\], shape \[cells\].
     pub von_mises_rule: Vec<f64>,
-    /// The same of the true displacements.
+    /// The same of the truth itself.
     pub von_mises_truth: Vec<f64>,
     /// At the scene's `record.places`.
     pub places: Vec<PlaceComparison>,
@@ -141,7 +140,19 @@ pub fn compare(
     let follows: Vec<bool> = engine.roles().iter().enumerate().map(followed).collect();
     let (elastic, known) = (&truth.elastic, &truth.solution.displacement);
     let rotation = scene.rotation();
-    let sides = Sides { cells: &cells, elastic, rotation, rule: &rule, truth: known, follows: &follows };
+    let von_mises_rule = von_mises(&cells, elastic, &rule, rotation);
+    let true_stress = truth.solution.stress_at(&cells.centres(&engine.body().reference));
+    let true_stress = true_stress.map_err(|error| refused(scene, &error))?;
+    let von_mises_truth: Vec<f64> = true_stress.iter().map(Stress::von_mises).collect();
+    let sides = Sides {
+        cells: &cells,
+        elastic,
+        rotation,
+        rule: &rule,
+        truth: known,
+        von_mises: [&von_mises_rule, &von_mises_truth],
+        follows: &follows,
+    };
     let mut comparison = Comparison::of(&sides)
         .map_err(|shape| scene.refuse("lattice", shape.to_string(), "use a lattice less slender"))?;
     let energy = truth.solution.strain_energy();
@@ -153,8 +164,6 @@ pub fn compare(
     comparison.truth_stated_rel_l2 =
         Some(truth.solution.error().displacement).filter(|error| error.is_finite());
     comparison.parts = ErrorParts::of(scene, &truth, &rule, &follows)?;
-    let von_mises_rule = von_mises(&cells, elastic, &rule, rotation);
-    let von_mises_truth = von_mises(&cells, elastic, known, rotation);
     let stresses = Stresses::at_present(engine).filter(|_| !scene.record.places.is_empty());
     let at_places = stresses.map_or_else(Vec::new, |stresses| at_places(scene, engine, &stresses));
     let places = compare_places(at_places, &truth.solution).map_err(|error| refused(scene, &error))?;

@@ -506,10 +506,12 @@ impl Control {
         }
     }
 
-    /// Finds where members may be whose poses are late: those that take no time to brake are between the places to which
-    /// they were sent. Of those that do, estimates the present states, and where they may be if they do not follow their targets: a lost one is where it was left to itself, one that was never heard nor sent anything is where it starts. The
-    /// targets of a member of another node are not known here, and none were sent to a place that is not of the member's own
-    /// poses: there the last place counts, with its age, and velocities that are older still.
+    /// Finds where members may be. Those that take no time to brake are between the places to which they were sent, also where
+    /// their poses are fresh: what counts once a pose is lost has to have counted before. Of those that do, estimates the present
+    /// states, and where they may be if they do not follow their targets: a lost one is where it was left to itself, one that was
+    /// never heard nor sent anything is where it starts. The targets of a member of another node are not known here, and none were
+    /// sent to a place that is not of the member's own poses: there the last place counts, with its age, and velocities that are
+    /// older still.
     fn follow_tracks(&mut self, now: f64) {
         let dynamics = self.dynamics();
         let gains = Gains::of(dynamics.acceleration, self.period, self.filter.limits().deviation);
@@ -520,7 +522,7 @@ impl Control {
             if !self.brakes {
                 stray.places.clear();
                 // One that is lost, or found to lie, need not do what it was sent to.
-                if follows && self.usable[member] && self.ages[member] > 0.0 {
+                if follows && self.usable[member] {
                     track.between(&mut stray.places);
                 }
                 continue;

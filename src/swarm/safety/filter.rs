@@ -339,10 +339,12 @@ impl Filter {
             if self.crowd.brakes {
                 let rest = self.resting_place(seen, period, member);
                 self.crowd.ways[member].take(here, rest, places);
-                self.crowd.longest = self.crowd.longest.max(self.crowd.ways[member].extent);
             } else if let Some(&last) = places.last() {
                 self.crowd.ways[member].take(here, last, places);
+            } else {
+                continue;
             }
+            self.crowd.longest = self.crowd.longest.max(self.crowd.ways[member].extent);
         }
         if count < GRID_FROM {
             return;
@@ -400,7 +402,9 @@ impl Filter {
         let here = seen.present.get(member);
         match self.crowd.brakes {
             true => (self.crowd.ways[member].way, self.drift(seen, member)),
-            false if places(seen, member).is_empty() => ([here; 2], self.drift(seen, member)),
+            false if places(seen, member).is_empty() || seen.ages[member] <= 0.0 => {
+                ([here; 2], self.drift(seen, member))
+            }
             false => (self.crowd.ways[member].way, self.crowd.ways[member].beside()),
         }
     }

@@ -197,6 +197,8 @@ impl Filter {
                 Border { ways, places: places(seen, other), keep, stray, reach }
             };
             let are_between = || [member, other].iter().all(|&m| !places(seen, m).is_empty());
+            // Of those that stand where they are seen all of this is the border between their poses.
+            let go_on = stray > 0.0 || [member, other].iter().any(|&m| !self.crowd.ways[m].is_point());
             let is_added = if brakes {
                 let border = border();
                 let takes_ways = !border.ways.iter().all(|ways| ways.is_point());
@@ -205,7 +207,7 @@ impl Filter {
                 }
                 takes_ways
             } else {
-                stray > 0.0 && are_between() && border().add_between(member < other, &mut self.cell.planes)
+                are_between() && go_on && border().add_between(member < other, &mut self.cell.planes)
             };
             if !is_added {
                 add_border(&mut self.cell.planes, [here, there, aside], standing, keep, stray, reach);

@@ -165,7 +165,7 @@ impl Border<'_> {
         let distance = length(way);
         let seen = length(minus(other.way[0], own.way[0]));
         let by_age = (seen * seen - self.stray * self.stray).max(0.0).sqrt() - self.stray;
-        if distance < by_age {
+        if distance < by_age && self.stray > 0.0 {
             return false;
         }
         let normal = way.map(|x| x / distance);
