@@ -8,7 +8,7 @@
 //!   2017). Of the free gap `d - r_i - r_j - clearance` between two members each takes half. Positions
 //!   alone decide, and of those only the ones in reach: a node that serves one member and hears all
 //!   ([`NodeScope`](super::control::scope::NodeScope)) gives the same bits as one that serves all, except for members
-//!   that brake or are seen late, whose targets it would have to know.
+//!   that brake, lag behind their targets or are seen late, whose targets it would have to know.
 //! * **Obstacles and geofence** by the plane through the nearest point of every edge in reach
 //!   ([`Obstacles`]), and a shape cast along the way as a second opinion.
 //! * **Deadlock** by keeping to the right ([`Patience`]).
@@ -41,6 +41,8 @@
 //! its side stays there. Discs of ages would have two robots that stand hold each other behind poses that are late enough; the hulls of
 //! such are points. Since the target of a member that has gone on is ahead of its pose, it may be as far from that
 //! as the member goes in the pose's age and a period, and from the last target as in a period: late poses slow no member.
+//! Behind poses of now the hulls count too: one that lags is on its way to the target of a period ago, and where its next pose is lost
+//! that target counts, which has to have counted before. Of members that are where they were sent they are points.
 //!
 //! # Members that take time to brake
 //! A double integrator that stands in its cell now may be unable to stay there. The ways on which members come to rest

@@ -152,7 +152,7 @@ impl Border<'_> {
     }
 
     /// Appends the half-plane between members each of which is somewhere on its hull, `is_first` the one of the lower number;
-    /// false, and nothing, where that is no better than what their ages say, or the hulls have a point in common. Both members
+    /// false, and nothing, where the hulls have a point in common, or are nearer than allowed and than what their ages say. Both members
     /// find the same. Hulls that are nearer than allowed, as noise may bring them, part: a member that stood where its late pose
     /// says instead would go after the noise of its poses, from each to the next.
     pub fn add_between(&self, is_first: bool, planes: &mut Vec<HalfPlane>) -> bool {
@@ -165,7 +165,8 @@ impl Border<'_> {
         let distance = length(way);
         let seen = length(minus(other.way[0], own.way[0]));
         let by_age = (seen * seen - self.stray * self.stray).max(0.0).sqrt() - self.stray;
-        if distance < by_age && self.stray > 0.0 {
+        // While hulls are as far apart as they have to be they part the members, or the next ones would not be.
+        if distance < by_age && distance < self.keep * (1.0 - TOUCHING) {
             return false;
         }
         let normal = way.map(|x| x / distance);
