@@ -346,7 +346,7 @@ impl RunArguments {
     fn common(&self, scene: &Scene) -> u64 {
         let mut all = serde_json::to_vec(&scene.raw).expect("a scene was read from text");
         let asked = (self.outputs(), self.checkpoints.every(), self.record.is_asked());
-        all.extend(format!("{:?} {asked:?} {:?} {:?}", scene.roles, self.publish, self.output).bytes());
+        all.extend(format!("{:?} {asked:?} {:?}", scene.roles, self.publish).bytes());
         fnv1a(&all)
     }
 

@@ -128,6 +128,8 @@ impl PartShares {
         let (least, most) = (least.copied().unwrap_or_default(), most.copied().unwrap_or_default());
         let body = &self.largest.setup.body;
         let around = body.count() - body.owned().len();
+        // Of two steps: what is looked at may be how far a particle has moved.
+        let looked_at = 2 * PLACE * (body.exact().len() - body.owned().len());
         let exchanged = match self.steps {
             _ if self.is_solved && !self.iterates_in_parts => {
                 "; each is given the whole matrix and solves for the whole body".to_owned()
@@ -141,9 +143,8 @@ impl PartShares {
             }
             0 => format!("; of others it receives {} bytes in each step", self.halo_bytes),
             steps => format!(
-                "; of others it receives {} bytes before every {steps} steps, {} where a step is looked at",
-                self.halo_bytes,
-                PLACE * around
+                "; of others it receives {} bytes before every {steps} steps, {looked_at} where a step is looked at",
+                self.halo_bytes
             ),
         };
         let condition = if are_drawn { "" } else { "with --figures none " };

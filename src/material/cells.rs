@@ -20,7 +20,6 @@ use super::stiffness::{
 };
 use crate::geometry::lists::{self, distinct, lists_of};
 use crate::geometry::outline::{Outline, OutlineError};
-use crate::geometry::point::plus;
 
 /// Cells of any polygons, in compressed form. Corners run counter-clockwise.
 #[derive(Clone, Debug, PartialEq)]
@@ -345,11 +344,7 @@ impl Cells {
 
     /// Centre of each cell, the mean of its corners \[length\], shape \[count\].
     pub fn centres(&self, reference: &Vectors) -> Vectors {
-        let centre = |cell: &[u32]| {
-            let sum = cell.iter().fold([0.0; 2], |sum, &i| plus(sum, reference.get(i as usize)));
-            sum.map(|s| s / cell.len() as f64)
-        };
-        self.iter().map(centre).collect()
+        self.centroids(reference).collect()
     }
 }
 

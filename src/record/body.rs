@@ -25,8 +25,9 @@ pub const STEP: f64 = 0.05;
 const FRAMES: usize = 500;
 /// Larger bodies are recorded without what a player could not show of them: members, then bonds.
 const MOST_MEMBERS: usize = 5_000;
-/// With three for each particle, the least of all lattices, of 60,000: of more, ranks may have a part each.
-const MOST_BONDS: usize = 180_000;
+const MOST_BONDS: usize = 200_000;
+/// Of more particles ranks may have a part each, and no rank all bonds (`export::figures::is_raster`).
+const MOST_BONDED: usize = 60_000;
 
 /// Writes down a run, step by step.
 pub struct BodyMessages {
@@ -134,7 +135,8 @@ fn markers(
     };
     (particles.points, particles.colors) = all.map(|(place, role)| (point(place), colour(role))).unzip();
     let mut markers = vec![particles];
-    if engine.parted().is_none() && engine.flock().neighbours.index.len() <= MOST_BONDS {
+    let is_bonded = engine.parted().is_none() && engine.body().total() <= MOST_BONDED;
+    if is_bonded && engine.flock().neighbours.index.len() <= MOST_BONDS {
         markers.push(bonds(engine, header, 0.08 * spacing));
     }
     MarkerArray { markers }

@@ -1,10 +1,17 @@
 //! A body under way, read by others: `flockform run --publish`.
 
+use std::ops::ControlFlow;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use flockform::continuum::equilibrium::run_to_equilibrium_shared;
+use flockform::continuum::plan::Plan;
 use flockform::engine::Engine;
+use flockform::engine::observer::Observer;
+use flockform::ranks::{Team, in_process};
 use flockform::scene::Scene;
+use flockform::shm::Reader;
+use flockform::shm::payload::Particle;
 use flockform::shm::positions::{Positions, read};
 
 use super::child::Process;
@@ -156,4 +163,56 @@ fn a_name_that_is_none_or_taken_is_refused_before_anything_is_written() {
         assert_eq!(output.status.code(), Some(2), "{words}");
         assert!(words.contains(word) && words.contains("help: ") && !out.exists(), "{words}");
     }
+}
+
+/// Looks at each step of a run that is shown, and reads it where there is a reader.
+struct Shown {
+    shown: Option<Positions>,
+    reader: Option<Reader<Particle>>,
+    seen: Vec<(u32, u32, [u64; 2])>,
+}
+
+impl Observer for Shown {
+    fn next(&mut self, step: usize) -> usize {
+        step + 1
+    }
+
+    fn see(&mut self, engine: &Engine, _: f64) -> ControlFlow<()> {
+        Positions::show(self.shown.as_mut(), engine);
+        if let Some(slice) = self.reader.as_ref().and_then(Reader::take) {
+            self.seen.extend(slice.iter().map(|one| (one.id, one.role, one.position.map(f64::to_bits))));
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+#[test]
+fn a_body_in_parts_is_shown_by_the_first_rank_as_one_alone() {
+    let scene = load("tension", &["stop.steps=5"]);
+    let shown = |team: Option<&Team>| {
+        let plan = team.map_or_else(|| planned(&scene), |team| Plan::of_part(&scene, team).expect("fits"));
+        let name = domain_name();
+        let peer = domain(&name).join("test").expect("shared memory");
+        let is_first = team.is_none_or(Team::is_first);
+        let open = || Positions::open(&domain(&name), "body", plan.setup.body.total()).expect("a publisher");
+        let shown = is_first.then(open);
+        let reader = is_first.then(|| read(&peer, "body").expect("a reader"));
+        let mut shown = Shown { shown, reader, seen: Vec::new() };
+        run_to_equilibrium_shared(&scene, plan, None, team, &mut shown).expect("can be shared");
+        shown.seen
+    };
+    let expected = shown(None);
+    assert_eq!(expected.len() % planned(&scene).count(), 0);
+    assert!(expected.len() >= 5 * planned(&scene).count());
+    let found: Vec<_> = std::thread::scope(|scope| {
+        let ranks: Vec<_> = in_process(3)
+            .into_iter()
+            .map(|team| {
+                let shown = &shown;
+                scope.spawn(move || shown(Some(&team)))
+            })
+            .collect();
+        ranks.into_iter().map(|rank| rank.join().expect("no panic")).collect()
+    });
+    assert!(found[0] == expected && found[1..].iter().all(Vec::is_empty));
 }

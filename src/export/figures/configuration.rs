@@ -139,7 +139,11 @@ impl Setting {
     fn heading(&self, subject: &Subject<'_>, mut note: String, is_field: bool) -> Heading {
         let style = Style::of(subject, is_field);
         if style == Style::Raster {
-            note += &format!("; {} particles drawn as squares", subject.total);
+            let all = subject.total;
+            // Of a body of which no other rank has a part there are fewer in a sample alone.
+            let drawn = if subject.team.is_none() { subject.body.count() } else { all };
+            let of_all = if drawn < all { format!("{drawn} of {all}") } else { all.to_string() };
+            note += &format!("; {of_all} particles drawn as squares");
         }
         // Surfaces and squares have the colours of the field alone.
         let legend = match style {

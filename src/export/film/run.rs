@@ -79,8 +79,8 @@ struct Shown<'a> {
     engine: &'a Engine,
     recorder: &'a RunRecorder,
     colour: FilmColour,
-    /// The particles that are shown, of a body in parts.
-    sample: Option<(&'a Sample, Body)>,
+    /// Of a body in parts the particles that are shown, and their places among them by their ids.
+    sample: Option<(Body, HashMap<u32, u32>)>,
     /// Of the body at the end, where strains are computed from the frames \[1\].
     largest_strain: Option<f64>,
 }
@@ -95,7 +95,11 @@ impl<'a> Shown<'a> {
         };
         let is_computed = quantity.is_some_and(|quantity| !recorder.keeps(quantity));
         let largest_strain = is_computed.then(|| largest_strain(engine)).flatten();
-        let sample = recorder.sample().map(|sample| (sample, sample.body(engine.body().lattice.spacing())));
+        let of_sample = |sample: &Sample| {
+            let places = sample.ids.iter().copied().zip(0..).collect();
+            (sample.body(engine.body().lattice.spacing()), places)
+        };
+        let sample = recorder.sample().map(of_sample);
         Self { scene, engine, recorder, colour, sample, largest_strain }
     }
 
@@ -104,7 +108,7 @@ impl<'a> Shown<'a> {
         let all = Subject::of(self.scene, self.engine);
         match &self.sample {
             None => all,
-            Some((_, body)) => {
+            Some((body, _)) => {
                 Subject { body, neighbours: None, cells: None, changes: &[], team: None, ..all }
             }
         }
@@ -135,8 +139,7 @@ impl<'a> Shown<'a> {
     /// Broken bonds by the particles that are shown: of a sample those with both or either end in it.
     fn broken_shown(&self, frame: usize) -> Vec<[u32; 2]> {
         let broken = self.broken(frame);
-        let Some((sample, _)) = &self.sample else { return broken };
-        let shown: HashMap<u32, u32> = sample.ids.iter().copied().zip(0..).collect();
+        let Some((_, shown)) = &self.sample else { return broken };
         let ends = broken.into_iter().filter_map(|pair| {
             let [a, b] = pair.map(|index| shown.get(&(index + 1)).copied());
             Some([a.or(b)?, b.or(a)?])

@@ -147,7 +147,8 @@ impl RunRecorder {
         let roles = roles(engine, sample.as_ref()).into_owned();
         let frames = Frames::new(count, channels);
         let first_roles = roles.clone();
-        let is_recovered = scene.equilibrium.is_some();
+        // A film shows it as the last frame has it.
+        let is_recovered = scene.equilibrium.is_some() || (films && sample.is_some());
         let (changes, is_solved) = (Vec::new(), false);
         Self { frames, first_roles, roles, changes, is_solved, is_recovered, sample }
     }
@@ -227,11 +228,12 @@ impl RunRecorder {
                 channels.retain(|channel| channel.name != VON_MISES);
             }
             self.frames = Frames::new(self.frames.count, channels);
-            let (whole, displacements) = (OnceCell::new(), engine.displacements());
+            let whole = OnceCell::new();
+            let displacements = self.sample.as_ref().map(|_| engine.displacements());
             for frame in 0..=LOAD_FRAMES {
                 let part = frame as f64 / LOAD_FRAMES as f64;
                 let of_sample = self.sample.as_ref();
-                let under = of_sample.map(|_| displaced(&engine.body().reference, &displacements, part));
+                let under = displacements.as_ref().map(|u| displaced(&engine.body().reference, u, part));
                 let places = under.as_ref().unwrap_or(engine.present());
                 let stress = || match is_linear(scene) {
                     false => von_mises(engine, part),

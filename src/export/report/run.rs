@@ -92,7 +92,7 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
         animation.stress.is_some() || (is_sample && !is_solved && animation.clock.quantity == "step");
     let before_the_last = match is_mean && outcome.engine.free_edge().is_some() {
         true => {
-            " Stress before the last frame is the mean of each particle's cells, at the last recovered along the outline too, as in \
+            " Stress before the last frame is the mean of each particle's cells (of a body in parts that is filmed it is not), at the last recovered along the outline too, as in \
              final.csv and films."
         }
         false => "",
@@ -102,7 +102,7 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
             " Ranks had a part of the body each: {} of its {} particles are shown, one of {} along either axis of the lattice, without bonds and cells. All values are kept to {bits} bits of each frame's range, or fewer.",
             animation.count,
             body.total(),
-            animation.spacing / body.lattice.spacing(),
+            (animation.spacing / body.lattice.spacing()).round(),
         );
         return note + before_the_last + " final.csv has all of them, to the last digit.";
     }
