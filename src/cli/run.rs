@@ -107,7 +107,6 @@ impl Prepared {
         let mut left = arguments.checkpoints.left()?;
         let asked = arguments.asked(left.as_ref());
         let words_of = SceneArguments::new(&asked.scene, &asked.set);
-        // Unless something is asked for that shows each particle of a small one.
         let may_be_parted = |scene: &Scene| team.is_some() && laid_out_whole_for(scene).is_none();
         let parts = |scene: &Scene| if may_be_parted(scene) { team.map_or(1, Team::count) } else { 1 };
         let scene = words_of.load_part(&[], parts)?;

@@ -342,7 +342,7 @@ impl Cells {
         self.iter().zip(&self.kind).map(place)
     }
 
-    /// Centre of each cell, the mean of its corners \[length\], shape \[count\].
+    /// The same as an array.
     pub fn centres(&self, reference: &Vectors) -> Vectors {
         self.centroids(reference).collect()
     }

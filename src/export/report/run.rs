@@ -92,8 +92,8 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
         animation.stress.is_some() || (is_sample && !is_solved && animation.clock.quantity == "step");
     let before_the_last = match is_mean && outcome.engine.free_edge().is_some() {
         true => {
-            " Stress before the last frame is the mean of each particle's cells (of a body in parts that is filmed it is not), at the last recovered along the outline too, as in \
-             final.csv and films."
+            " Stress before the last frame is the mean of each particle's cells, unless ranks film the body in parts; at the last it is \
+             recovered along the outline too, as in final.csv and films."
         }
         false => "",
     };
