@@ -197,8 +197,9 @@ impl Filter {
                 Border { ways, places: places(seen, other), keep, stray, reach }
             };
             let are_between = || [member, other].iter().all(|&m| !places(seen, m).is_empty());
-            // Of those that stand where they are seen all of this is the border between their poses.
-            let go_on = stray > 0.0 || [member, other].iter().any(|&m| !self.crowd.ways[m].is_point());
+            // Of those that stand where they are seen, but for rounding, all of this is the border between their poses.
+            let goes_on = |m: usize| self.crowd.ways[m].extent > TOUCHING * keep;
+            let go_on = stray > 0.0 || goes_on(member) || goes_on(other);
             let is_added = if brakes {
                 let border = border();
                 let takes_ways = !border.ways.iter().all(|ways| ways.is_point());
