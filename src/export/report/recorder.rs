@@ -185,13 +185,7 @@ impl RunRecorder {
                 true => von_mises(engine, 1.0),
                 false => Stresses::von_mises_of_cells(engine),
             };
-            let seen = Seen {
-                engine,
-                sample: self.sample.as_ref(),
-                part: 1.0,
-                places: engine.present(),
-                stress: &stress,
-            };
+            let seen = Seen::now(engine, self.sample.as_ref(), &stress);
             self.frames.keep(engine.step(), |_, channel| seen.values(channel).into());
             self.take_roles(engine);
         }
@@ -244,13 +238,7 @@ impl RunRecorder {
             }
         } else {
             let stress = || von_mises(engine, 1.0);
-            let seen = Seen {
-                engine,
-                sample: self.sample.as_ref(),
-                part: 1.0,
-                places: engine.present(),
-                stress: &stress,
-            };
+            let seen = Seen::now(engine, self.sample.as_ref(), &stress);
             self.frames.keep_last(engine.step(), |_, channel| seen.values(channel).into());
         }
         self.take_roles(engine);
@@ -390,7 +378,12 @@ struct Seen<'a> {
     stress: &'a dyn Fn() -> Vec<f64>,
 }
 
-impl Seen<'_> {
+impl<'a> Seen<'a> {
+    /// The body as it is.
+    fn now(engine: &'a Engine, sample: Option<&'a Sample>, stress: &'a dyn Fn() -> Vec<f64>) -> Self {
+        Self { engine, sample, part: 1.0, places: engine.present(), stress }
+    }
+
     /// Values of a channel, shape \[count\].
     fn values(&self, channel: &Channel) -> Vec<f64> {
         let Self { engine, part, places, .. } = *self;
