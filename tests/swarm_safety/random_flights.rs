@@ -7,7 +7,6 @@ use std::ops::ControlFlow;
 use flockform::flock::vectors::distance;
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::flight::fly;
-use flockform::swarm::robots::Unicycle;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -191,9 +190,7 @@ fn fly_all(series: &Series, seed: u64, flights: usize) -> Outcome {
         moved += report.way[0];
         let Some(clearance) = report.clearance else { continue };
         outcome.least = outcome.least.min(clearance - declared);
-        // One that is to give way by less than its tolerance stands still.
-        let slack = if series.model == FAST_UNICYCLE { Unicycle::default().tolerance } else { ROUNDING };
-        outcome.broken += usize::from(clearance < declared - slack);
+        outcome.broken += usize::from(clearance < declared - ROUNDING);
     }
     println!("{series:?}, {flights} flights: {outcome:?}");
     // Robots that stand still keep every clearance.

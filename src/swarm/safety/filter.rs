@@ -104,7 +104,7 @@ pub(super) struct Crowd {
     drift: f64,
     /// Whether members take time to brake.
     pub(super) brakes: bool,
-    /// All places that each may take until it is at rest; of those that take no time to brake only where they are late.
+    /// All places that each may take until it is at rest.
     pub(super) ways: Vec<Ways>,
     /// Largest distance of such a place from its member \[m\].
     longest: f64,
@@ -336,14 +336,12 @@ impl Filter {
         self.crowd.ways.resize_with(count, Ways::default);
         for member in 0..count {
             let (here, places) = (seen.present.get(member), places(seen, member));
-            if self.crowd.brakes {
-                let rest = self.resting_place(seen, period, member);
-                self.crowd.ways[member].take(here, rest, places);
-            } else if let Some(&last) = places.last() {
-                self.crowd.ways[member].take(here, last, places);
-            } else {
-                continue;
-            }
+            let rest = match places.last() {
+                _ if self.crowd.brakes => self.resting_place(seen, period, member),
+                Some(&last) => last,
+                None => here,
+            };
+            self.crowd.ways[member].take(here, rest, places);
             self.crowd.longest = self.crowd.longest.max(self.crowd.ways[member].extent);
         }
         if count < GRID_FROM {
@@ -395,18 +393,6 @@ impl Filter {
     pub(super) fn drift(&self, seen: &Seen, member: usize) -> f64 {
         let (age, fastest) = (seen.ages[member], self.fastest());
         if fastest.is_finite() && age > 0.0 { fastest * age } else { 0.0 }
-    }
-
-    /// The way on which a member is or comes to rest \[m\], and how far it may be from that \[m\].
-    pub(super) fn whereabouts(&self, seen: &Seen, member: usize) -> ([[f64; 2]; 2], f64) {
-        let here = seen.present.get(member);
-        match self.crowd.brakes {
-            true => (self.crowd.ways[member].way, self.drift(seen, member)),
-            false if places(seen, member).is_empty() || seen.ages[member] <= 0.0 => {
-                ([here; 2], self.drift(seen, member))
-            }
-            false => (self.crowd.ways[member].way, self.crowd.ways[member].beside()),
-        }
     }
 
     /// Whether a member of this radius \[m\] may stand at a place.

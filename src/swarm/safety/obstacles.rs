@@ -13,8 +13,9 @@ use parry2d::partitioning::{Bvh, BvhBuildStrategy};
 use parry2d::query::{PointQuery, ShapeCastOptions, cast_shapes};
 use parry2d::shape::{Ball, Segment};
 
-use super::cell::{HalfPlane, nearest};
+use super::cell::{HalfPlane, foot, length, nearest};
 use super::limits::{Place, SafetyError};
+use super::ways::edges;
 use crate::geometry::box_tree::BoxTree;
 use crate::geometry::point::{area, minus};
 use crate::geometry::shape::{crossing, segments_cross};
@@ -175,10 +176,11 @@ impl Obstacles {
     }
 
     /// Appends the half-planes that keep a member at `place`, finite, `keep` \[m\] away from every solid as
-    /// long as it moves no further than `reach` \[m\], and that it does not leave on its straight way to `rest`.
+    /// long as it moves no further than `reach` \[m\], and in which all places of the hull with these corners are that are so far away.
     pub(super) fn planes_near(
         &mut self,
-        [place, rest]: [[f64; 2]; 2],
+        place: [f64; 2],
+        hull: &[[f64; 2]],
         keep: f64,
         reach: f64,
         planes: &mut Vec<HalfPlane>,
@@ -194,12 +196,11 @@ impl Obstacles {
         self.within = within;
         let margin = Vector::splat((keep + reach).min(LARGEST));
         let near = Aabb::new(here - margin, here + margin);
-        let way = (rest != place).then(|| Segment::new(here, vector(rest)));
         self.near.clear();
         for leaf in self.tree.intersect_aabb(&near) {
             match &self.pieces[leaf as usize] {
                 Piece::Edge { outline, .. } if self.within[*outline] => {}
-                piece => self.near.push((piece.distance(piece.place_nearest(here, way.as_ref())), leaf)),
+                piece => self.near.push((piece.distance(piece.place_nearest(hull)), leaf)),
             }
         }
         self.near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -211,7 +212,7 @@ impl Obstacles {
             {
                 continue;
             }
-            let from = piece.place_nearest(here, way.as_ref());
+            let from = piece.place_nearest(hull);
             let normal = self.towards(piece, from);
             let ahead = vector(normal).dot(from - here);
             planes.push(HalfPlane { normal, offset: distance - keep + ahead });
@@ -296,12 +297,11 @@ impl Obstacles {
             return of_ends;
         }
         let (here, there) = (vector(from), vector(to));
-        let way = Segment::new(here, there);
         let margin = Vector::splat(of_ends.min(LARGEST));
         let near = Aabb::new(here.min(there) - margin, here.max(there) + margin);
         let of_piece = |leaf: u32| match &self.pieces[leaf as usize] {
             Piece::Edge { segment, .. } if segments_cross(from, to, pair(segment.a), pair(segment.b)) => 0.0,
-            piece => piece.distance(piece.place_nearest(here, Some(&way))),
+            piece => piece.distance(piece.place_nearest(&[from, to])),
         };
         self.tree.intersect_aabb(&near).map(of_piece).fold(of_ends, f64::min)
     }
@@ -369,16 +369,15 @@ impl Piece {
 }
 
 impl Piece {
-    /// The place on the way from `here`, where there is one, that is nearest to the piece.
-    fn place_nearest(&self, here: Vector, way: Option<&Segment>) -> Vector {
-        let Some(way) = way else { return here };
-        match self {
-            Piece::Edge { segment, .. } => {
-                let [place, _] = nearest([way.a, way.b].map(pair), [segment.a, segment.b].map(pair));
-                vector(place)
-            }
-            Piece::Disc { centre, .. } => way.project_local_point(*centre, true).point,
-        }
+    /// The place in the hull with these corners, one or more, that is nearest to the piece.
+    fn place_nearest(&self, hull: &[[f64; 2]]) -> Vector {
+        let from_edge = |edge: [[f64; 2]; 2]| match self {
+            Piece::Edge { segment, .. } => nearest(edge, [segment.a, segment.b].map(pair)),
+            Piece::Disc { centre, .. } => [foot(edge, pair(*centre)), pair(*centre)],
+        };
+        let apart = |[a, b]: &[[f64; 2]; 2]| length(minus(*b, *a));
+        let found = edges(hull).map(from_edge).min_by(|a, b| apart(a).total_cmp(&apart(b)));
+        vector(found.map_or(hull[0], |[place, _]| place))
     }
 
     /// Whether all of the piece is as far behind a plane as the plane's own piece, so that a member that stays

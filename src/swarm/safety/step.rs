@@ -216,12 +216,17 @@ impl Filter {
         }
         let obstacles = self.cell.planes.len();
         let radius = self.radii[member] + margin;
-        let (way, drift) = self.whereabouts(seen, member);
-        // Its way back begins at the end of that on which it is.
-        let reach = reach + drift + if brakes { 0.0 } else { length(minus(way[1], here)) };
-        self.obstacles.planes_near(way, radius + self.limits.clearance, reach, &mut self.cell.planes);
+        let ways = &self.crowd.ways[member];
+        // Where it is, or comes to rest, and how far it may be from there. Its way back begins at the end of that on which it is.
+        let (hull, drift, gone) = if brakes || places(seen, member).is_empty() {
+            (&ways.way[..], drift, 0.0)
+        } else {
+            (&ways.corners[..], 0.0, ways.extent)
+        };
+        let reach = reach + drift + gone;
+        self.obstacles.planes_near(here, hull, radius + self.limits.clearance, reach, &mut self.cell.planes);
         let fence = self.cell.planes.len();
-        self.fence.planes_near(way, radius, reach, &mut self.cell.planes);
+        self.fence.planes_near(here, hull, radius, reach, &mut self.cell.planes);
         for plane in &mut self.cell.planes[obstacles..] {
             plane.offset = aged(plane.offset - drift, plane.offset);
         }

@@ -17,7 +17,7 @@ pub struct Ways {
     /// Whether it takes no others.
     is_straight: bool,
     /// Corners of the convex hull, in order \[m\].
-    corners: Vec<[f64; 2]>,
+    pub corners: Vec<[f64; 2]>,
     sorted: Vec<[f64; 2]>,
     /// Largest distance of a corner from the member \[m\].
     pub extent: f64,
@@ -44,24 +44,18 @@ impl Ways {
         self.extent == 0.0
     }
 
-    /// Largest distance of one of its places from the straight way \[m\].
-    pub fn beside(&self) -> f64 {
-        let off = |&corner: &[f64; 2]| length(minus(corner, foot(self.way, corner)));
-        self.corners.iter().map(off).fold(0.0, f64::max)
-    }
-
-    /// The pairs of neighbouring corners.
-    fn edges(&self) -> impl Iterator<Item = [[f64; 2]; 2]> {
-        let count = self.corners.len();
-        // A segment has one edge.
-        (0..if count > 2 { count } else { 1 }).map(move |k| [self.corners[k], self.corners[(k + 1) % count]])
-    }
-
     /// The largest offset of one of its places from the member along `normal` \[m\].
     fn support(&self, normal: [f64; 2]) -> f64 {
         let offset = |corner: &[f64; 2]| dot(normal, minus(*corner, self.way[0]));
         self.corners.iter().map(offset).fold(f64::NEG_INFINITY, f64::max)
     }
+}
+
+/// The pairs of neighbouring corners of a hull.
+pub fn edges(corners: &[[f64; 2]]) -> impl Iterator<Item = [[f64; 2]; 2]> {
+    let count = corners.len();
+    // A segment has one edge.
+    (0..if count > 2 { count } else { 1 }).map(move |k| [corners[k], corners[(k + 1) % count]])
 }
 
 /// Corners of the convex hull of these places, counter-clockwise: the lower and the upper chain (A. M. Andrew, "Another
@@ -92,10 +86,14 @@ fn hull(places: &mut Vec<[f64; 2]>, corners: &mut Vec<[f64; 2]>) {
 
 /// The nearest points of two hulls; `None` if they have a point in common.
 fn nearest_of(first: &Ways, second: &Ways) -> Option<[[f64; 2]; 2]> {
-    let from =
-        first.corners.iter().flat_map(|&corner| second.edges().map(move |edge| [corner, foot(edge, corner)]));
-    let to =
-        second.corners.iter().flat_map(|&corner| first.edges().map(move |edge| [foot(edge, corner), corner]));
+    let from = first
+        .corners
+        .iter()
+        .flat_map(|&corner| edges(&second.corners).map(move |edge| [corner, foot(edge, corner)]));
+    let to = second
+        .corners
+        .iter()
+        .flat_map(|&corner| edges(&first.corners).map(move |edge| [foot(edge, corner), corner]));
     let square = |[a, b]: &[[f64; 2]; 2]| dot(minus(*b, *a), minus(*b, *a));
     let [near, far] = from.chain(to).min_by(|a, b| square(a).total_cmp(&square(b)))?;
     let way = minus(far, near);
@@ -252,7 +250,7 @@ mod tests {
             let ways = ways(&places);
             prop_assert!(ways.corners.iter().all(|corner| places.contains(corner)));
             if ways.corners.len() > 2 {
-                for [a, b] in ways.edges() {
+                for [a, b] in edges(&ways.corners) {
                     let least = places.iter().map(|&p| cross(minus(b, a), minus(p, a))).fold(f64::INFINITY, f64::min);
                     prop_assert!(least >= -1e-12, "{places:?} beside {a:?} to {b:?} by {least}");
                 }
