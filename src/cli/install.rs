@@ -7,6 +7,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use flockform::continuum::digest::fnv1a;
+use flockform::export::shell::quoted;
 use flockform::scene::bundled::SWARMS;
 
 use super::{Refusal, interrupt, print};
@@ -108,9 +109,10 @@ pub fn install(arguments: &InstallArguments) -> Result<ExitCode, Refusal> {
     staged.into_iter().try_for_each(Staged::move_into_place)?;
     earlier.remove_what_is_gone(prefix, &files);
     print(&format!(
-        "Installed into {prefix}. Then, where ROS 2 is set up:\n  source '{prefix}/setup.bash'\n  \
+        "Installed into {prefix}. Then, where ROS 2 is set up:\n  source {setup}\n  \
          ros2 launch flockform formation_launch.xml\n",
-        prefix = prefix.display()
+        prefix = prefix.display(),
+        setup = quoted(&prefix.join("setup.bash").to_string_lossy())
     ))?;
     Ok(ExitCode::SUCCESS)
 }

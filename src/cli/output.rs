@@ -122,17 +122,16 @@ fn folder_name(name: &str) -> String {
 }
 
 /// Options that change nothing of a report, and whether a value follows.
-const WITHOUT_EFFECT: [(&str, bool); 12] = [
+const WITHOUT_EFFECT: [(&str, bool); 11] = [
     ("--out", true),
     ("--force", false),
     ("--quiet", false),
-    ("-q", false),
     ("--verbose", false),
-    ("-v", false),
     ("--open", false),
     ("--json", false),
     ("--figures", true),
     ("--film", true),
+    ("--film-colour", true),
     ("--record", true),
     ("--publish", true),
 ];
@@ -149,6 +148,8 @@ pub fn command_line(arguments: impl IntoIterator<Item = String>) -> String {
     while let Some(argument) = arguments.next() {
         let name = argument.split_once('=').map_or(argument.as_str(), |(name, _)| name);
         match WITHOUT_EFFECT.iter().find(|(known, _)| *known == name) {
+            // Of these one word may have several.
+            None if name.starts_with("-v") || name.starts_with("-q") => {}
             None => words.push(quoted(&argument)),
             Some((known, takes_value)) if *takes_value && *known == argument => drop(arguments.next()),
             Some(_) => {}
@@ -172,11 +173,31 @@ mod tests {
     fn a_command_line_can_be_typed_again() {
         let of = |line: &[&str]| command_line(line.iter().map(|&word| word.to_owned()));
         assert_eq!(
-            of(&["swarm", "square", "-q", "--out", "a b", "--set", "title=it's", "--force", "--out=c"]),
+            of(&[
+                "swarm",
+                "square",
+                "-q",
+                "--out",
+                "a b",
+                "--set",
+                "title=it's",
+                "-vv",
+                "--force",
+                "--out=c"
+            ]),
             r"flockform swarm square --set 'title=it'\''s'"
         );
         assert_eq!(
-            of(&["compare", "my scene.toml", "--truth-error", "0.01", "--open"]),
+            of(&[
+                "compare",
+                "my scene.toml",
+                "--truth-error",
+                "0.01",
+                "--open",
+                "--film=a.gif",
+                "--film-colour",
+                "stretch"
+            ]),
             "flockform compare 'my scene.toml' --truth-error 0.01"
         );
     }

@@ -21,7 +21,7 @@ use crate::flock::rules::{FeedbackReference, Mean, Rotation};
 use crate::geometry::point::area;
 use crate::material::outline_loads::Resultant;
 use crate::scene::raw::RawLoad;
-use crate::scene::text::counted;
+use crate::scene::text::{counted, percent};
 use crate::scene::{LoadSteps, Scene, SceneError, Weights as SceneWeights};
 use crate::sweep::{Order, Sweep};
 
@@ -174,9 +174,9 @@ fn facts(
             let (solver, why) = select_solver(scene, &asked.request, plan)?;
             let how = match asked.accuracy {
                 Some(part) => format!(
-                    "for an accuracy of {} % the run chooses spacing, solver, tolerance and precision, for which it solves for \
+                    "for an accuracy of {} the run chooses spacing, solver, tolerance and precision, for which it solves for \
                      the truth as well",
-                    100.0 * part
+                    percent(part)
                 ),
                 None => format!("found by {solver}: {why}"),
             };

@@ -400,7 +400,7 @@ fn roles(roles: &[u8]) -> Bytes {
     bytes.into()
 }
 
-/// Broken bonds as the page unpacks them: those after the `known` first ones, or all of them anew.
+/// Broken bonds as the page unpacks them: more of them, or all anew.
 pub(super) fn broken(pairs: &[[u32; 2]], is_anew: bool) -> Bytes {
     let mut bytes = Vec::with_capacity(8 + 8 * pairs.len());
     bytes.extend(BROKEN.to_le_bytes());

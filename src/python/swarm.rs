@@ -44,7 +44,7 @@ impl Swarm {
         Ok(poses.chunks_exact(width).map(pose).collect())
     }
 
-    /// The time of a tick, which does not run backwards.
+    /// The time of a tick: the given one, or that of the tick before.
     fn time(&self, now: Option<f64>) -> PyResult<f64> {
         match now {
             Some(now) if !now.is_finite() => {

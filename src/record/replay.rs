@@ -55,7 +55,7 @@ pub struct RobotDifference {
     pub recorded: u64,
     /// Targets of which recording and replay differ by more than the tolerance.
     pub differ: u64,
-    /// Targets that only the recording has, and that only the replay has.
+    /// Targets that only the recording has.
     pub only_recorded: u64,
     /// Targets that only the replay has.
     pub only_replayed: u64,

@@ -32,6 +32,11 @@ pub fn decimals(value: f64, places: usize) -> String {
     if value.abs() < LONG { format!("{value:.places$}") } else { format!("{value:.places$e}") }
 }
 
+/// A part as so many percent, without the digits that only binary fractions give it.
+pub fn percent(part: f64) -> String {
+    format!("{} %", (100.0 * part) as f32)
+}
+
 /// The text of a file of at most one GiB, so that a device without end, or another program's data, is refused and
 /// does not fill the memory.
 ///

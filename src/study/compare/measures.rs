@@ -48,9 +48,9 @@ pub struct Comparison {
     pub followers: usize,
     /// Cells whose stress and energy are compared.
     pub cells: usize,
-    /// Time to the rule's equilibrium and to the truth's \[s\]; zero where it was not measured.
+    /// Time to the rule's equilibrium \[s\]; zero where it was not measured.
     pub seconds_rule: f64,
-    /// Time to the truth's \[s\].
+    /// Time to the truth's \[s\]; zero likewise.
     pub seconds_truth: f64,
 }
 

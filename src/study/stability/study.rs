@@ -80,7 +80,7 @@ pub struct Linear {
     pub particles: usize,
     /// Particles that follow.
     pub followers: usize,
-    /// Spectral radius of the scene's sweep as it is, and the sweeps it took to find it.
+    /// Spectral radius of the scene's sweep as it is.
     pub radius: f64,
     /// Sweeps that it took to find the radius.
     pub iterations: usize,

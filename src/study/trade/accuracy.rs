@@ -12,6 +12,7 @@ use crate::continuum::equilibrium::solve_equilibrium;
 use crate::continuum::run::Outcome;
 use crate::flock::role::Role;
 use crate::scene::raw::RawMean;
+use crate::scene::text::percent;
 use crate::scene::{Scene, SceneError};
 use crate::solve::equilibrium::{Precision, Request};
 use crate::study::compare::reference::Effort;
@@ -55,7 +56,7 @@ pub fn choose(scene: Scene, load: LoadScene<'_>) -> Result<Chosen, SceneError> {
         return Ok(Chosen { scene, words: String::new(), estimate: None });
     };
     if !matches!(scene.raw.rule.mean, Some(RawMean::Material { .. })) {
-        let words = format!("accuracy {} %: the paper's rule at the written spacing\n", 100.0 * accuracy);
+        let words = format!("accuracy {}: the paper's rule at the written spacing\n", percent(accuracy));
         return Ok(Chosen { scene, words, estimate: None });
     }
     require_comparable(&scene)?;
@@ -219,8 +220,8 @@ fn words(solved: &Solved, accuracy: f64, part: f64) -> String {
     };
     let request = solved.scene.equilibrium.map(|asked| asked.request).unwrap_or_default();
     format!(
-        "accuracy {} %: material rule at {spacing} (error {:.3} % against finite elements on the shape), tolerance {:e}, {:?}\n",
-        100.0 * accuracy,
+        "accuracy {}: material rule at {spacing} (error {:.3} % against finite elements on the shape), tolerance {:e}, {:?}\n",
+        percent(accuracy),
         100.0 * solved.error,
         request.tolerance,
         request.precision

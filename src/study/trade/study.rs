@@ -73,7 +73,7 @@ pub struct Study {
     pub name: String,
     /// Title of the scene.
     pub title: String,
-    /// Nodes of the truth that errors are measured against, and the time it took \[s\].
+    /// Nodes of the truth that errors are measured against.
     pub truth_nodes: usize,
     /// Time that the truth took \[s\].
     pub truth_seconds: f64,
