@@ -170,6 +170,8 @@ pub struct Checkpointer<'a> {
     before: Duration,
     last: Instant,
     last_step: usize,
+    /// The step of the one in the folder.
+    written: Option<usize>,
     /// Whether the last one could not be written: each one more is no news.
     has_failed: bool,
 }
@@ -192,6 +194,7 @@ impl<'a> Checkpointer<'a> {
             before,
             last: start,
             last_step,
+            written: left.map(|_| last_step),
             has_failed: false,
         }
     }
@@ -199,6 +202,15 @@ impl<'a> Checkpointer<'a> {
     /// Time taken for the steps by this run and those before it.
     pub fn stepping(&self) -> Duration {
         self.before + self.start.elapsed()
+    }
+
+    /// The next step at which one is due for its number.
+    pub fn next(&self, step: usize) -> usize {
+        let due = self.every.iter().filter_map(|interval| match interval {
+            Interval::Steps(steps) if self.scene.equilibrium.is_none() => Some(self.last_step + steps),
+            _ => None,
+        });
+        due.filter(|due| *due > step).min().unwrap_or(usize::MAX)
     }
 
     pub fn is_due(&self, step: usize) -> bool {
@@ -220,12 +232,13 @@ impl<'a> Checkpointer<'a> {
         mut kept: Recorded<'_>,
     ) {
         (self.last_step, self.last) = (engine.0.step(), Instant::now());
+        let is_first = folder.is_some();
         let synced = kept.frames.as_mut().map_or(Ok(()), |frames| frames.sync());
         match self.write(folder, engine, &kept, synced) {
             Ok(()) => {
                 let took = self.last.elapsed();
                 tracing::debug!("checkpoint of step {} in {took:.1?}", self.last_step);
-                if std::mem::take(&mut self.has_failed) {
+                if std::mem::take(&mut self.has_failed) && is_first {
                     tracing::warn!("checkpoints are written again, at step {}", self.last_step);
                 }
             }
@@ -247,7 +260,7 @@ impl<'a> Checkpointer<'a> {
     /// Leaves a checkpoint of the last step, and says whether there is one. Frames are on their way to the disk then: to wait
     /// for each would take longer than an interrupt may.
     pub fn leave(
-        &self,
+        &mut self,
         folder: Option<&mut OutputFolder>,
         engine: (&Engine, f64),
         kept: &Recorded<'_>,
@@ -266,8 +279,22 @@ impl<'a> Checkpointer<'a> {
     /// Writes it, once the frames are there as `synced` says, before the folder takes its name: that one is never without a
     /// checkpoint.
     fn write(
-        &self,
+        &mut self,
         mut folder: Option<&mut OutputFolder>,
+        (engine, residual): (&Engine, f64),
+        kept: &Recorded<'_>,
+        synced: Result<(), ExportError>,
+    ) -> Result<(), ExportError> {
+        if self.written != Some(engine.step()) {
+            self.write_anew(folder.as_deref().map(OutputFolder::folder), (engine, residual), kept, synced)?;
+            self.written = Some(engine.step());
+        }
+        folder.as_mut().map_or(Ok(()), |folder| interrupt::keep_unfinished(folder, resume_words))
+    }
+
+    fn write_anew(
+        &self,
+        folder: Option<&Path>,
         (engine, residual): (&Engine, f64),
         kept: &Recorded<'_>,
         synced: Result<(), ExportError>,
@@ -278,17 +305,13 @@ impl<'a> Checkpointer<'a> {
         let load_steps = if folder.is_some() { kept.load_steps } else { &[] };
         let recorded = (kept.snapshots, kept.drawn, kept.probes, load_steps, animation);
         let state = (EngineState::of(engine), residual);
-        let mut checkpoint = Checkpoint::new(of, state, recorded, self.stepping());
+        let checkpoint = Checkpoint::new(of, state, recorded, self.stepping());
         if let Some(team) = engine.parted() {
             let first = engine.body().index_from(engine.body().owned().start);
-            let folder = folder.as_deref().map(OutputFolder::folder);
-            checkpoint = checkpoint.with_parts(folder, (first, team), synced)?;
-        } else {
-            synced?;
+            return checkpoint.write_in_parts(folder, (first, team), synced);
         }
-        let Some(folder) = folder.as_mut() else { return Ok(()) };
-        checkpoint.write(folder.folder())?;
-        interrupt::keep_unfinished(folder, resume_words)
+        synced?;
+        folder.map_or(Ok(()), |folder| checkpoint.write(folder))
     }
 }
 

@@ -251,7 +251,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
         (SharedError::Scene(error), _) => Refusal::from(error),
         (error, Some(folder)) => ResumedRun::foreign(folder, &error).into(),
     })?;
-    let RunObserver { mut recorder, messages, progress, checkpointer, mut folder, .. } = observer;
+    let RunObserver { mut recorder, messages, progress, mut checkpointer, mut folder, .. } = observer;
     progress.finish();
     if let Some(messages) = messages {
         messages.finish(&outcome.engine, outcome.residual);

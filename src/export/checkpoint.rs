@@ -19,6 +19,7 @@ mod error;
 mod tests;
 
 use std::borrow::Cow;
+use std::fmt::Display;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, ErrorKind, Seek, Write};
 use std::path::Path;
@@ -144,24 +145,26 @@ impl<'a> Checkpoint<'a> {
         }
     }
 
-    /// The checkpoint of a body of which each rank has a part, made by all ranks together: the others write their states, each
-    /// that of the particles from the number `first` of the whole body on, into the `folder` of the first one, which names them.
+    /// Writes the checkpoint of a body of which each rank has a part, by all ranks together: the others write their states, each
+    /// that of the particles from the number `first` of the whole body on, into the `folder` of the first one, which names them and
+    /// does the rest, as in [`Checkpoint::write`]. Where one of them cannot be written nothing is left of it, and the former one is
+    /// as it was, which has to be of another step.
     ///
     /// # Errors
-    /// A state that cannot be written, by any rank, or what the first one says of its own: `ready`.
-    pub fn with_parts(
+    /// A state that cannot be written, by any rank, or what the first one says of its own: `ready`. The same for all.
+    pub fn write_in_parts(
         mut self,
         folder: Option<&Path>,
         (first, team): (usize, &Team),
         ready: Result<(), ExportError>,
-    ) -> Result<Self, ExportError> {
+    ) -> Result<(), ExportError> {
         let step = self.engine.step();
         let name = |rank: usize| part_name(step, rank);
         let write = |path: &Path| -> io::Result<()> { self.write_to(create(path)?)?.sync_all() };
-        write_each(folder, name, team, |path| match folder {
+        let mut written = write_each(folder, name, team, |path| match folder {
             Some(_) => ready,
             None => write(path).map_err(ExportError::io("write", path)),
-        })?;
+        });
         let parts = team.each([first as u64, self.engine.count() as u64]).into_iter().enumerate();
         let part = |(rank, [first, count]): (usize, [u64; 2])| OtherPart {
             file: name(rank),
@@ -169,7 +172,16 @@ impl<'a> Checkpoint<'a> {
             count: count as usize,
         };
         self.parts.others = parts.skip(1).map(part).collect();
-        Ok(self)
+        written = written.and_then(|()| folder.map_or(Ok(()), |folder| self.write(folder)));
+        let has_failed = team.of_first([u64::from(written.is_err())]) == [1];
+        if has_failed && let Some(folder) = folder {
+            // On a full disk they would be in the way of the next ones.
+            remove_parts(folder, |part| !part.starts_with(&part_name(step, "")));
+        }
+        match written {
+            Ok(()) if has_failed => Err(ExportError::OnRank { rank: 0, path: FILE.into() }),
+            written => written,
+        }
     }
 
     /// Takes the place of the former checkpoint in the folder when it is whole on the disk, as those of all parts are; parts of
@@ -366,7 +378,7 @@ pub fn remove(folder: &Path) {
 }
 
 /// The name of a rank's part of the checkpoint of a step.
-fn part_name(step: usize, rank: usize) -> String {
+fn part_name(step: usize, rank: impl Display) -> String {
     format!("{FILE}.{step}.{rank}")
 }
 

@@ -100,6 +100,10 @@ pub(super) fn charts(record: &Record, report: &FlightReport) -> Vec<Chart> {
         };
         those.map(line).collect()
     };
+    let errors = match report.faulty.is_empty() {
+        true => "largest distance of a robot from its place",
+        false => "largest distance of a robot without a fault from its place",
+    };
     let mut charts = Vec::new();
     // An ideal flight has errors of rounding, which no axis in metres would show.
     let visible = |s: &Series| s.points.iter().any(|point| point[1] > 0.0);
@@ -107,7 +111,7 @@ pub(super) fn charts(record: &Record, report: &FlightReport) -> Vec<Chart> {
         let bounds = declared(&["affine_error", "final_error", "continuum_error"]);
         charts.push(Chart::new(
             &report.title,
-            "largest distance of a robot from its place",
+            errors,
             [time(), Axis::log("distance", "m")],
             shape.iter().cloned().chain(bounds).filter(visible).collect(),
         ));
@@ -124,7 +128,7 @@ pub(super) fn charts(record: &Record, report: &FlightReport) -> Vec<Chart> {
         // A robot alone, which is where it should be.
         charts.push(Chart::new(
             &report.title,
-            "largest distance of a robot from its place",
+            errors,
             [time(), Axis::new("distance", "m")],
             shape.into_iter().filter(|s| !s.points.is_empty()).collect(),
         ));

@@ -1,11 +1,12 @@
 //! The memory that a run takes at its largest, before it does, with its outputs ([`crate::continuum::memory`] has what the
-//! run itself takes); within a tenth (`tests/cli/memory.rs`). Films, recordings and ParaView files come on top, and what was
+//! run itself takes); within a tenth (`tests/cli/memory.rs`). Films and recordings come on top, and what was
 //! taken and given back before the plan was made, by the finite elements of a truth that leads or a setting that was chosen.
 
 use super::figures::axes::Axes;
 use super::figures::page::Bounds;
 use super::figures::{Formats, PNG_ZOOM, components, is_raster, page, panels};
 use super::report::recorder::{Packed, packed};
+use super::vtk;
 use crate::continuum::memory::{measured, on_the_way, solving, stepped};
 use crate::continuum::plan::Plan;
 use crate::engine::setup::RoleChange;
@@ -68,7 +69,8 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
     let drawn = if is_drawn_at_once { DRAWN * (drawn_before + 1) } else { 0 };
     let Packed { values, frames, packing, text } =
         if outputs.report { packed(scene, plan, false) } else { Packed::default() };
-    let while_stepping = if is_drawn_at_once { drawing_at_once(plan) } else { 0 };
+    let drawing_at_once = if is_drawn_at_once { drawing_at_once(plan) } else { 0 };
+    let while_stepping = drawing_at_once.max(frame(scene, plan));
     let stepping = match is_solved_at_once {
         true => solving(scene, plan).max(while_stepping),
         false => values + frames[0] + taken_back(scene, plan) + solving(scene, plan).max(while_stepping),
@@ -102,6 +104,11 @@ fn drawing_at_once(plan: &Plan) -> usize {
     (SNAPSHOT + shown) * plan.count() + stresses(plan)
 }
 
+/// Bytes of a frame for ParaView while it is written.
+fn frame(scene: &Scene, plan: &Plan) -> usize {
+    if scene.record.vtk_every == 0 { 0 } else { measured(plan) + vtk::bytes(plan) }
+}
+
 /// Bytes of the places to which a body is taken back whose step diverges, or whose steps at once came to rest on the way.
 fn taken_back(scene: &Scene, plan: &Plan) -> usize {
     if scene.is_solved_at_once() { 0 } else { 16 * plan.count() }
@@ -127,7 +134,8 @@ pub fn of_part(
         if outputs.keeps_frames() && writes { packed(scene, plan, outputs.film) } else { Packed::default() };
     let stepping = ON_THE_WAY * halo + taken_back(scene, plan);
     let moments = scene.record.figures.len() + 1;
-    let while_stepping = if outputs.draws() { drawing_at_once(plan) } else { 0 };
+    let drawing_at_once = if outputs.draws() { drawing_at_once(plan) } else { 0 };
+    let while_stepping = drawing_at_once.max(frame(scene, plan));
     let drawing = match outputs.draws() && writes {
         true => DRAWN * moments + pictures(scene, plan, moments),
         false => 0,

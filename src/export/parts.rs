@@ -1,5 +1,7 @@
 //! Files that ranks write together, each its own, into the folder of the first one.
 
+use std::ffi::OsString;
+use std::os::unix::ffi::OsStringExt;
 use std::path::{Path, PathBuf};
 
 use super::error::ExportError;
@@ -14,7 +16,8 @@ pub(super) fn write_each(
     write: impl FnOnce(&Path) -> Result<(), ExportError>,
 ) -> Result<(), ExportError> {
     let own = folder.map_or(&b""[..], |folder| folder.as_os_str().as_encoded_bytes());
-    let folder = PathBuf::from(String::from_utf8_lossy(&team.each_bytes(own)[0]).into_owned());
+    let first = team.each_bytes(own).swap_remove(0);
+    let folder = PathBuf::from(OsString::from_vec(first));
     let written = write(&folder.join(name(team.rank())));
     let failed = team.each([u64::from(written.is_err())]).iter().position(|&[failed]| failed == 1);
     match failed {

@@ -35,6 +35,8 @@ use super::manifest::{Written, create, create_buffered};
 use super::parts::write_each;
 use super::{OutputFolder, bonds};
 use crate::continuum::mechanics::Stresses;
+use crate::continuum::memory::neighbour_entries;
+use crate::continuum::plan::Plan;
 use crate::engine::Engine;
 use crate::flock::body::Body;
 use crate::flock::law::Weights;
@@ -353,6 +355,17 @@ fn write_point_data(out: &mut impl Write, values: &Values<'_>, rows: &Range<usiz
 fn with_von_mises(stress: &StressState) -> [f64; 4] {
     let [xx, yy, xy] = stress.components;
     [xx, yy, xy, stress.von_mises]
+}
+
+/// Bytes of a frame of a plan while it is written, beside what is measured for it.
+pub(super) fn bytes(plan: &Plan) -> usize {
+    let cells = plan.setup.cells.as_ref().map_or(0, Cells::count);
+    let is_material = matches!(plan.setup.flock.weights, Weights::Matrix(_));
+    let bonds = if is_material { 0 } else { neighbour_entries(plan) / 2 };
+    let of_points = (size_of::<usize>() + size_of::<[f64; 4]>()) * plan.count();
+    size_of::<(usize, [u32; 2])>() * bonds
+        + size_of::<&[u32]>() * cells
+        + of_points.max(size_of::<[f64; 4]>() * cells)
 }
 
 /// The points and the cells of the file, in their order.

@@ -40,7 +40,6 @@ struct Cell {
     own: u32,
     /// Where its corners begin in `slots`.
     corners: u32,
-    factor: f64,
 }
 
 impl CellsAround {
@@ -49,10 +48,10 @@ impl CellsAround {
         Self { elements, starts: vec![0], patch_starts: vec![0], ..Self::default() }
     }
 
-    /// Adds a cell to the class at hand: its kind, which of its corners the particle is, which neighbour each corner is
-    /// ([`OWN`](super::rules::OWN) for the particle), and a factor on its stiffness.
-    pub fn push(&mut self, element: u32, own: usize, slots: &[u32], factor: f64) {
-        self.cells.push(Cell { element, own: own as u32, corners: self.slots.len() as u32, factor });
+    /// Adds a cell to the class at hand: its kind, which of its corners the particle is, and which neighbour each corner is
+    /// ([`OWN`](super::rules::OWN) for the particle).
+    pub fn push(&mut self, element: u32, own: usize, slots: &[u32]) {
+        self.cells.push(Cell { element, own: own as u32, corners: self.slots.len() as u32 });
         self.slots.extend(slots);
     }
 
@@ -102,7 +101,6 @@ impl CellsAround {
             let element = &self.elements[cell.element as usize];
             CellAround {
                 element,
-                factor: cell.factor,
                 own: cell.own as usize,
                 slots: &self.slots[cell.corners as usize..][..element.corners()],
             }

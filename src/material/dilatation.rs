@@ -78,15 +78,12 @@ impl<'a> Patches<'a> {
         self.areas[self.cells.kind[cell] as usize] / self.middles(cell).count() as f64
     }
 
-    /// The patches around a particle, in groups of one material and one stiffness `factor`: their cells, in order.
-    pub fn around(&self, particle: usize, factor: Option<&[f64]>) -> Vec<Vec<usize>> {
+    /// The patches around a particle, in groups of one material: their cells, in order.
+    pub fn around(&self, particle: usize) -> Vec<Vec<usize>> {
         let around = self.incidence.of(particle).iter().map(|&cell| cell as usize);
         let mut patches: Vec<Vec<usize>> = Vec::new();
         for cell in around.filter(|&cell| self.middles(cell).any(|i| i == particle)) {
-            let alike = |patch: &&mut Vec<usize>| {
-                self.region(patch[0]) == self.region(cell)
-                    && factor.is_none_or(|factor| factor[patch[0]] == factor[cell])
-            };
+            let alike = |patch: &&mut Vec<usize>| self.region(patch[0]) == self.region(cell);
             match patches.iter_mut().find(alike) {
                 Some(patch) => patch.push(cell),
                 None => patches.push(vec![cell]),

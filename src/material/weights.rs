@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use assembly::Assembly;
 
-use super::cells::{Cells, Incidence};
+use super::cells::Cells;
 use super::dilatation::Patches;
 use super::elastic::Elastic;
 use super::mechanism::{Mechanism, require_rigid};
@@ -95,24 +95,6 @@ pub enum WeightsError {
         /// Id of the particle.
         particle: usize,
     },
-    /// Stiffness factors do not fit the cells.
-    #[error("{given} stiffness factors were given for {cells} cells")]
-    FactorCount {
-        /// Factors that were given.
-        given: usize,
-        /// Cells that there are.
-        cells: usize,
-    },
-    /// A stiffness factor that is not positive and finite.
-    #[error(
-        "the stiffness factor of cell {cell} (counted from 1) must be positive and finite, but it is {value}"
-    )]
-    Factor {
-        /// Number of the cell, from 1.
-        cell: usize,
-        /// The given value \[1\].
-        value: f64,
-    },
 }
 
 impl WeightsError {
@@ -151,45 +133,17 @@ impl MaterialWeights {
         if body.part.is_none() {
             require_rigid(cells, &incidence, &body.reference, |i| !body.is_frame[i])?;
         }
-        Self::gather((cells, &incidence), neighbours, elastic, None, &|i| body.index(i))
-    }
-
-    /// Weights of cells at any points, with a stiffness factor for each cell where given, shape
-    /// \[cells\] (a contrast of materials, damage). Neighbours are [`Cells::neighbours`].
-    pub fn on_points(
-        cells: &Cells,
-        reference: &Vectors,
-        elastic: &Elastic,
-        factor: Option<&[f64]>,
-    ) -> Result<Self, WeightsError> {
-        let cells = cells.on_points(reference);
-        let incidence = cells.incidence(reference.len());
-        require_rigid(&cells, &incidence, reference, |_| true)?;
-        let neighbours = cells.neighbours(reference.len(), elastic);
-        Self::gather((&cells, &incidence), neighbours, elastic, factor, &|i| i)
-    }
-
-    /// `index` is that of a particle in the whole body.
-    fn gather(
-        (cells, incidence): (&Cells, &Incidence),
-        neighbours: Neighbours,
-        elastic: &Elastic,
-        factor: Option<&[f64]>,
-        index: &(dyn Fn(usize) -> usize + Sync),
-    ) -> Result<Self, WeightsError> {
-        check_factor(cells, factor)?;
         let elements = elements(cells, elastic)?;
-        let averaged = Patches::new(cells, incidence, neighbours.count(), elastic);
+        let averaged = Patches::new(cells, &incidence, neighbours.count(), elastic);
         let gradients = cells.shapes.iter().map(|shape| mean_gradients(shape)).collect();
         let assembly = Assembly {
             cells,
-            incidence,
+            incidence: &incidence,
             neighbours: &neighbours,
             elements,
             gradients,
             averaged,
-            factor,
-            index,
+            index: &|i| body.index(i),
         };
         let (class, first) = assembly.classes();
         // Every row is summed over its own cells in their order: the same bits on any number of threads.
@@ -258,17 +212,6 @@ impl MaterialWeights {
             fx * x + fy * y
         };
         -0.5 * (0..self.count()).map(work).sum::<f64>()
-    }
-}
-
-fn check_factor(cells: &Cells, factor: Option<&[f64]>) -> Result<(), WeightsError> {
-    let Some(factor) = factor else { return Ok(()) };
-    if factor.len() != cells.count() {
-        return Err(WeightsError::FactorCount { given: factor.len(), cells: cells.count() });
-    }
-    match factor.iter().position(|f| !(*f > 0.0 && f.is_finite())) {
-        Some(cell) => Err(WeightsError::Factor { cell: cell + 1, value: factor[cell] }),
-        None => Ok(()),
     }
 }
 

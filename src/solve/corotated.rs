@@ -267,11 +267,10 @@ impl Corotated<'_> {
         for cell in self.weights.cells_around(i) {
             let corner = |slot| self.corner(i, slot, u);
             let row = cell.element.row(cell.own, |k| cell.corner(k, corner))?;
-            let scaled = |block: &Block| block.map(|row| row.map(|entry| cell.factor * entry));
-            add(&mut force, row.force.map(|f| cell.factor * f));
+            add(&mut force, row.force);
             for (&slot, block) in cell.slots.iter().zip(&row.tangent) {
                 let sum = if slot == OWN { &mut diagonal } else { &mut blocks[slot as usize] };
-                *sum = plus(sum, &scaled(block));
+                *sum = plus(sum, block);
             }
             turn = turn.or(Some(row.turn));
         }

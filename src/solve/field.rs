@@ -4,12 +4,6 @@ pub use crate::flock::real::Real;
 use crate::flock::vectors::Vectors;
 
 impl<T: Real> Vectors<T> {
-    /// The same numbers in this precision.
-    pub fn cast(vectors: &Vectors) -> Self {
-        let cast = |values: &[f64]| values.iter().map(|&value| T::of(value)).collect();
-        Self { x: cast(&vectors.x), y: cast(&vectors.y) }
-    }
-
     /// Both coordinates, whole.
     pub fn view(&self) -> VectorsRef<'_, T> {
         VectorsRef { x: &self.x, y: &self.y }

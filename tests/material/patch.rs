@@ -1,5 +1,7 @@
 //! Affine fields are followed exactly, rigid motions cost nothing.
 
+use std::sync::Arc;
+
 use flockform::flock::block::{Block, plus, transposed};
 use flockform::flock::body::Cut;
 use flockform::flock::lattice::{Lattice, LatticeKind};
@@ -41,7 +43,7 @@ fn an_affine_boundary_is_followed_exactly_on_every_lattice() {
 #[test]
 fn an_affine_boundary_is_followed_exactly_where_points_are_out_of_place() {
     for kind in KINDS {
-        let (body, _, cells) = sample(kind, 0.3);
+        let (mut body, neighbours, cells) = sample(kind, 0.3);
         let shift = |i: usize| [0.11 * (7.3 * i as f64).sin(), 0.11 * (3.1 * i as f64 + 1.0).sin()];
         let points: Vectors = (0..body.count())
             .map(|i| {
@@ -49,8 +51,10 @@ fn an_affine_boundary_is_followed_exactly_where_points_are_out_of_place() {
                 [p[0] + s[0], p[1] + s[1]]
             })
             .collect();
+        body.reference = Arc::new(points.clone());
+        let moved = cells.on_points(&points);
         let weights =
-            MaterialWeights::on_points(&cells, &points, &sheet(1000.0, 0.33), None).expect("assembles");
+            MaterialWeights::assemble(&moved, &body, neighbours, &sheet(1000.0, 0.33)).expect("assembles");
         let exact: Vectors = points.iter().map(affine).collect();
         let leads = on_boundary(&cells, body.count());
         let led = (0..body.count()).map(|i| if leads[i] { exact.get(i) } else { [0.0; 2] }).collect();

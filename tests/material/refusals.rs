@@ -73,20 +73,3 @@ fn a_body_that_folds_at_a_corner_is_refused_by_name() {
     let refused = MaterialWeights::assemble(&cells, &body, neighbours, &sheet(1.0, 0.3));
     assert_eq!(refused, Err(WeightsError::Mechanism(Mechanism::Hinge { particle: at + 1 })));
 }
-
-#[test]
-fn stiffness_factors_are_felt_and_bad_ones_refused() {
-    let (body, _, cells) = build(Lattice::new(KINDS[0], [0.0; 2], 0.0), &CUT);
-    let with = |factor: &[f64]| {
-        MaterialWeights::on_points(&cells, &body.reference, &sheet(1000.0, 0.33), Some(factor))
-    };
-    let plain = with(&[1.0; 25]).expect("fits");
-    let mut factor = vec![1.0; 25];
-    factor[0] = 1e12;
-    let stiff = with(&factor).expect("fits");
-    assert!(stiff.of(0).diagonal[0][0] > 0.9e12 * plain.of(0).diagonal[0][0]);
-    assert_eq!(stiff.of(35), plain.of(35));
-    assert_eq!(with(&[1.0; 24]), Err(WeightsError::FactorCount { given: 24, cells: 25 }));
-    factor[3] = 0.0;
-    assert_eq!(with(&factor), Err(WeightsError::Factor { cell: 4, value: 0.0 }));
-}

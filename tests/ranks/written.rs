@@ -17,7 +17,9 @@ use flockform::engine::observer::Observer;
 use flockform::engine::state::EngineState;
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
 use flockform::export::figures::Formats;
-use flockform::export::{Drawing, OutputFolder, Results, Timings, VtkSeries, write_all, write_piece};
+use flockform::export::{
+    Drawing, ExportError, OutputFolder, Results, Timings, VtkSeries, write_all, write_piece,
+};
 use flockform::ranks::Team;
 use flockform::scene::{LoadSteps, Scene};
 use resvg::usvg::roxmltree::{Document, Node};
@@ -55,16 +57,27 @@ impl Writer<'_> {
 
     fn leave(&self, engine: &Engine, residual: f64) {
         let asked = RunRequest { scene: "plate".into(), set: Vec::new(), force: false };
-        let state = (EngineState::of(engine), residual);
-        let recorded = (&[][..], &[][..], &[][..], &self.rows[..], None);
-        let mut left =
-            Checkpoint::new((&asked, self.scene, self.digest), state, recorded, Duration::default());
-        if let Some(team) = self.team {
-            let first = engine.body().index_from(engine.body().owned().start);
-            let folder = self.folder.map(OutputFolder::folder);
-            left = left.with_parts(folder, (first, team), Ok(())).expect("written");
+        let made = || {
+            let state = (EngineState::of(engine), residual);
+            let recorded = (&[][..], &[][..], &[][..], &self.rows[..], None);
+            Checkpoint::new((&asked, self.scene, self.digest), state, recorded, Duration::default())
+        };
+        let folder = self.folder.map(OutputFolder::folder);
+        let Some(team) = self.team else {
+            return made().write(folder.expect("alone")).expect("written");
+        };
+        let first = engine.body().index_from(engine.body().owned().start);
+        // One that the first rank cannot write is one of none, and takes no room.
+        let failed =
+            made().write_in_parts(folder, (first, team), Err(ExportError::MissingFrame("full".into())));
+        assert!(failed.is_err(), "{failed:?}");
+        for folder in folder {
+            let names = std::fs::read_dir(folder).expect("listed").flatten().map(|entry| entry.file_name());
+            let left: Vec<_> =
+                names.filter(|name| name.to_string_lossy().starts_with(checkpoint::FILE)).collect();
+            assert!(left.is_empty(), "{left:?}");
         }
-        self.folder.iter().for_each(|folder| left.write(folder.folder()).expect("written"));
+        made().write_in_parts(folder, (first, team), Ok(())).expect("written");
     }
 }
 

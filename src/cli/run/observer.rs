@@ -32,7 +32,8 @@ pub struct RunObserver<'a> {
 impl Observer for RunObserver<'_> {
     fn next(&mut self, step: usize) -> usize {
         let message = self.messages.as_ref().map_or(usize::MAX, |messages| messages.next(step));
-        self.looks.next(step).min(self.recorder.next(step)).min(message)
+        let asked = self.recorder.next(step).min(self.checkpointer.next(step)).min(message);
+        self.looks.next(step).min(asked)
     }
 
     fn see(&mut self, engine: &Engine, residual: f64) -> ControlFlow<()> {

@@ -198,10 +198,13 @@ fn on_axes(chart: &Chart, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
 
 /// The axes around everything shown, so high \[px\], their place still to be given.
 fn window(chart: &Chart, height: f64) -> Axes {
-    let shown = || chart.series.iter().flat_map(|s| &s.points).filter_map(|&p| on_axes(chart, p));
+    let points = || chart.series.iter().flat_map(|series| &series.points);
     let marked: Vec<f64> = chart.landmarks.iter().filter_map(|m| on_axis(&chart.x, m.x)).collect();
     let range = |k: usize| {
-        let values = shown().map(|p| p[k]).chain(if k == 0 { marked.clone() } else { Vec::new() });
+        // A line that comes to zero goes on, where the axis of its values has none.
+        let axis = [&chart.x, &chart.y][k];
+        let values = points().filter(|p| !p[1 - k].is_nan()).filter_map(|p| on_axis(axis, p[k]));
+        let values = values.chain(if k == 0 { marked.clone() } else { Vec::new() });
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         match (low.is_finite(), high - low) {
             (false, _) => [0.0, 1.0],
@@ -218,8 +221,8 @@ fn window(chart: &Chart, height: f64) -> Axes {
 
 /// Positions of ticks as the axes count, with their labels (none for a minor tick).
 fn ticks(axis: &Axis, low: f64, high: f64, most: f64) -> (Vec<(f64, String)>, String) {
-    if !axis.is_log || high - low < 0.7 {
-        // Within less than a decade powers of ten would leave the axis bare.
+    if !axis.is_log || high - low < 1.0 {
+        // Within less than a decade there may be no power of ten.
         let exponential = |value: f64| if axis.is_log { 10f64.powf(value) } else { value };
         let ticks = Ticks::within(exponential(low), exponential(high), most);
         let at = |value: f64| Some((on_axis(axis, value)?, ticks.label(value)));
@@ -304,11 +307,14 @@ fn draw_landmark(svg: &mut Svg, chart: &Chart, axes: &Axes, landmark: &Landmark)
 }
 
 fn draw_series(svg: &mut Svg, chart: &Chart, axes: &Axes, series: &Series) {
-    let places: Vec<[f64; 2]> =
-        series.points.iter().filter_map(|&p| on_axes(chart, p)).map(|p| axes.place(p)).collect();
+    let place = |&point: &[f64; 2]| on_axes(chart, point).map(|point| axes.place(point));
+    let places: Vec<[f64; 2]> = series.points.iter().filter_map(place).collect();
     if matches!(series.style, Style::Line | Style::Front) {
         let mut path = Path::default();
-        path.polyline(thinned(&places));
+        // What an axis cannot show, as a logarithmic one zeros, is a gap.
+        for line in series.points.split(|point| on_axes(chart, *point).is_none()) {
+            path.polyline(thinned(&line.iter().filter_map(place).collect::<Vec<_>>()));
+        }
         let width = if series.style == Style::Line { 1.7 } else { 1.0 };
         let stroke =
             format!("stroke=\"{}\" stroke-width=\"{width}\" stroke-linejoin=\"round\"", series.colour);
@@ -385,7 +391,19 @@ mod tests {
     }
 
     #[test]
+    fn a_line_has_a_gap_where_a_logarithmic_axis_cannot_show_it_and_goes_on_to_the_end_of_time() {
+        let points = vec![[0.0, 1e-1], [1.0, 1e-8], [2.0, 0.0], [3.0, 1e-8], [4.0, 1e-7], [50.0, 0.0]];
+        let series = Series::new("", "#000000", Style::Line, points);
+        let svg = draw(&Chart::new("T", "", [Axis::new("time", "s"), Axis::log("error", "s")], vec![series]));
+        let line = svg.split("class=\"series\"").nth(1).expect("drawn").split("/>").next().expect("ends");
+        assert_eq!((line.matches('M').count(), line.matches('L').count()), (2, 2), "{line}");
+        assert!(svg.contains(">50<"), "{svg}");
+    }
+
+    #[test]
     fn an_axis_of_less_than_a_decade_still_has_labels() {
+        let svg = draw(&chart(vec![[1.5, 1.4], [8.5, 8.4]]));
+        assert!(svg.matches(">4<").count() + svg.matches(">4.0<").count() >= 2, "{svg}");
         let svg = draw(&chart(vec![[1.0, 0.5], [1.2, 0.7]]));
         assert!(svg.contains(">0.50<") && svg.contains(">1.0") && !svg.contains("NaN"), "{svg}");
     }

@@ -100,14 +100,11 @@ impl<'a> Map<'a> {
 
     fn legend(&self, is_field: bool) -> Vec<Key> {
         let [leader, follower] = [Role::Leader, Role::Follower].map(colour::of_role);
-        let mut legend = vec![
-            Key::new("leader", leader, mark_of(Role::Leader)),
-            Key::new("follower", follower, Mark::Dot),
-            Key::new("start", START, Mark::Ring),
-        ];
-        if is_field {
-            legend.remove(1);
+        let mut legend = vec![Key::new("leader", leader, mark_of(Role::Leader))];
+        if !is_field && (0..self.report.per_robot.len()).any(|m| !self.leads(m)) {
+            legend.push(Key::new("follower", follower, Mark::Dot));
         }
+        legend.push(Key::new("start", START, Mark::Ring));
         if !self.swarm.raw.obstacles.is_empty() {
             legend.push(Key::new("obstacle", OBSTACLE, Mark::Dot));
         }

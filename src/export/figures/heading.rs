@@ -118,9 +118,20 @@ pub fn draw_mark(svg: &mut Svg, mark: Mark, [x, y]: [f64; 2], radius: f64) {
 /// Breaks a text between words so that no line is wider than `room` \[px\].
 fn wrapped(text: &str, size: f64, room: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    for word in text.split_whitespace() {
+    let fits = |line: &str| text_width(line, size) <= room;
+    for mut word in text.split_whitespace() {
+        // A word longer than a line, as those of scripts without spaces are.
+        while !fits(word) {
+            let ends = word.char_indices().map(|(at, _)| at).skip(1);
+            let end = ends
+                .take_while(|&end| fits(&word[..end]))
+                .last()
+                .unwrap_or_else(|| word.ceil_char_boundary(1));
+            lines.push(word[..end].to_owned());
+            word = &word[end..];
+        }
         match lines.last_mut() {
-            Some(line) if text_width(&format!("{line} {word}"), size) <= room => {
+            Some(line) if fits(&format!("{line} {word}")) => {
                 line.push(' ');
                 line.push_str(word);
             }
@@ -140,6 +151,10 @@ mod tests {
         let (short, long) = (heading("Tension"), heading(&"tension ".repeat(40)));
         assert_eq!(wrapped(&short.title, TITLE_TEXT, 768.0), ["Tension"]);
         assert_eq!(wrapped(&long.title, TITLE_TEXT, 768.0).concat().matches("tension").count(), 40);
+        let word = "\u{10d}".repeat(400);
+        let lines = wrapped(&word, TITLE_TEXT, 768.0);
+        assert_eq!(lines.concat(), word);
+        assert!(lines.iter().all(|line| text_width(line, TITLE_TEXT) <= 768.0), "{lines:?}");
         assert!(long.height(800.0) > short.height(800.0) + 50.0);
     }
 }

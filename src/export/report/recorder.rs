@@ -460,7 +460,7 @@ fn animation(scene: &Scene, engine: &Engine, is_solved: bool) -> Animation {
 
 /// Whether displacements and stresses are as many times as large as their cause.
 pub(in crate::export) fn is_linear(scene: &Scene) -> bool {
-    scene.material.is_some() && !turns(scene) && scene.fracture.is_none()
+    scene.material.is_some() && scene.mean.is_affine() && scene.fracture.is_none()
 }
 
 /// Whether stress is that of cells turned back first.

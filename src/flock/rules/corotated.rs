@@ -223,8 +223,6 @@ impl Element {
 pub struct CellAround<'a> {
     /// Stiffness and shape of the cell.
     pub element: &'a Element,
-    /// Factor on its stiffness \[1\].
-    pub factor: f64,
     /// Which of its corners the particle is.
     pub own: usize,
     /// Which of the particle's neighbours each corner is, shape \[corners\]; [`OWN`] for itself.
@@ -243,9 +241,7 @@ impl CellAround<'_> {
     /// Force on the particle \[force, world frame\] and what holds it, `R K_ii R'` \[force / length\].
     fn pull(&self, neighbour: impl Fn(usize) -> Corner) -> Option<([f64; 2], Block)> {
         let (turn, force) = self.element.force_on(self.own, |k| self.corner(k, &neighbour))?;
-        let hold =
-            turn.turned(self.element.block(self.own, self.own)).map(|row| row.map(|k| self.factor * k));
-        Some((force.map(|f| self.factor * f), hold))
+        Some((force, turn.turned(self.element.block(self.own, self.own))))
     }
 }
 

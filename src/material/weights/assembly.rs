@@ -26,7 +26,6 @@ pub(super) struct Assembly<'a> {
     pub gradients: Vec<Vec<[f64; 2]>>,
     /// Over which cells dilatations are averaged.
     pub averaged: Option<Patches<'a>>,
-    pub factor: Option<&'a [f64]>,
     /// The index of a particle in the whole body, in the order of which all is summed.
     pub index: &'a (dyn Fn(usize) -> usize + Sync),
 }
@@ -102,9 +101,6 @@ impl Assembly<'_> {
 
     /// `None` where cells differ in more than their kind, or do not fit the pattern.
     fn pattern(&self, particle: usize) -> Option<Pattern> {
-        if self.factor.is_some() {
-            return None;
-        }
         if self.averaged.is_some() {
             return self.long_pattern(particle);
         }
@@ -158,11 +154,11 @@ impl Assembly<'_> {
         let mut middles: Vec<usize> = self.around(particle).flat_map(|cell| patches.middles(cell)).collect();
         middles.sort_unstable_by_key(|&middle| (self.index)(middle));
         middles.dedup();
-        let around = middles.into_iter().flat_map(|middle| patches.around(middle, self.factor));
+        let around = middles.into_iter().flat_map(|middle| patches.around(middle));
         let own = |cell: &usize| self.cells.of(*cell).contains(&(particle as u32));
         let felt = around.filter(|patch| patch.iter().any(own));
         let of_cells = |cells: Vec<usize>| {
-            let lambda = patches.lambda(cells[0]).unwrap_or(0.0) * self.factor(cells[0]);
+            let lambda = patches.lambda(cells[0]).unwrap_or(0.0);
             let part = |cell: usize| Part { cell, share: patches.share(cell) };
             let parts: Vec<Part> = cells.into_iter().map(part).collect();
             let area: f64 = parts.iter().map(|part| part.share).sum();
@@ -207,7 +203,6 @@ impl Assembly<'_> {
         let mut blocks = vec![Block::default(); seen.len()];
         for cell in self.around(particle) {
             let (k, slots) = (&self.elements[self.cells.kind[cell] as usize], self.slots(particle, cell));
-            let factor = self.factor(cell);
             let own = slots.iter().position(|&slot| slot == Some(OWN)).unwrap_or_default();
             for (other, slot) in slots.into_iter().enumerate().filter(|&(other, _)| other != own) {
                 let Some(slot) = slot else {
@@ -219,7 +214,7 @@ impl Assembly<'_> {
                     });
                 };
                 let slot = slot as usize;
-                let entry = |a: usize, b: usize| -factor * k[(2 * own + a, 2 * other + b)];
+                let entry = |a: usize, b: usize| -k[(2 * own + a, 2 * other + b)];
                 blocks[slot] = plus(&blocks[slot], &[[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]);
             }
         }
@@ -235,10 +230,6 @@ impl Assembly<'_> {
 
     fn around(&self, particle: usize) -> impl Iterator<Item = usize> {
         self.incidence.of(particle).iter().map(|&cell| cell as usize)
-    }
-
-    fn factor(&self, cell: usize) -> f64 {
-        self.factor.map_or(1.0, |factor| factor[cell])
     }
 
     /// Which neighbour of a particle each corner of a cell is, [`OWN`] for itself, shape \[corners\].
@@ -277,7 +268,7 @@ impl Assembly<'_> {
             for cell in self.around(particle) {
                 let slots = slots(cell);
                 let own = slots.iter().position(|&slot| slot == OWN).unwrap_or_default();
-                around.push(self.cells.kind[cell], own, &slots, self.factor(cell));
+                around.push(self.cells.kind[cell], own, &slots);
             }
             for Patch { stiffness, parts } in self.patches(particle) {
                 let of_part = |part: &Part| (self.cells.kind[part.cell], part.share, slots(part.cell));

@@ -229,7 +229,11 @@ pub fn solve_shared(system: &System, request: &Request, team: Option<&Team>) -> 
         Err(SolveError::NotPositive { .. }) => {
             Some(format!("{solver} took the body for unstable, which a factorisation finds out"))
         }
-        Ok(found) if found.residuals.len() > PATIENCE && request.most_iterations > PATIENCE => {
+        Ok(found)
+            if found.residuals.len() > PATIENCE
+                && request.most_iterations > PATIENCE
+                && found.residuals.last().is_some_and(|left| *left > request.tolerance) =>
+        {
             Some(format!("{solver} was not at rest after {PATIENCE} iterations, and a factorisation is"))
         }
         _ => None,

@@ -29,6 +29,10 @@ impl Fault {
         }
     }
 
+    pub fn has_begun(&self, now: f64) -> bool {
+        self.from <= now
+    }
+
     /// Its kind.
     pub fn name(&self) -> &'static str {
         match self.kind {

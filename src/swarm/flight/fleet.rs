@@ -88,6 +88,11 @@ impl Fleet {
         self.fault(member).is_none()
     }
 
+    /// Whether the robot has a fault, or had one.
+    pub(super) fn had_fault(&self, member: usize) -> bool {
+        self.faults.iter().any(|fault| fault.member == member && fault.has_begun(self.time()))
+    }
+
     /// Whether the robot moves at all now.
     fn is_able(&self, member: usize) -> bool {
         !self.fault(member).is_some_and(Fault::stands)

@@ -38,6 +38,8 @@ pub struct FlightReport {
     pub programs_ended: bool,
     /// Robots of which no pose was ever believed; programs do not begin while a leader is among them.
     pub never_heard: Vec<String>,
+    /// Robots that had a fault, while which errors leave them out.
+    pub faulty: Vec<String>,
     /// Whether the leaders' programs began.
     pub programs_began: bool,
     /// Time after which the formation stayed within `settled_within` of its shape, counted from the end of the
@@ -158,6 +160,11 @@ impl FlightReport {
             ("Largest acceleration", self.acceleration.as_ref().map(|one| one.words(&number))),
             ("Way", Some(way)),
             ("Robots lost", (self.most_lost > 0).then(|| format!("{} at one time", self.most_lost))),
+            ("With a fault", first_few(self.faulty.iter().map(|name| format!("`{name}`")))),
+            (
+                "Errors and settling time",
+                (!self.faulty.is_empty()).then(|| "of the robots without a fault at the time".to_owned()),
+            ),
             ("Never heard", first_few(self.never_heard.iter().map(|name| format!("`{name}`")))),
         ];
         facts.into_iter().filter_map(|(name, value)| Some((name, value?))).collect()
@@ -175,6 +182,8 @@ impl FlightReport {
             false => 0.0,
         };
         let to_come = finite(waited + formation.programs_end()).filter(|_| formation.is_led_here());
+        let faulty = (0..formation.count()).filter(|&m| flight.fleet().had_fault(m));
+        let faulty: Vec<String> = faulty.map(|m| formation.names[m].clone()).collect();
         let never_heard = (0..formation.count()).filter(|&m| flight.control().position(m).is_none());
         let never_heard: Vec<String> = never_heard.map(|m| formation.names[m].clone()).collect();
         let mut report = Self {
@@ -204,6 +213,7 @@ impl FlightReport {
                 record.ways.iter().copied().fold(0.0, f64::max),
             ],
             most_lost: samples.iter().map(|s| s.lost).max().unwrap_or(0).max(never_heard.len()),
+            faulty,
             never_heard,
             bounds: Vec::new(),
             per_robot: (0..formation.count()).map(|m| robot(flight, record, m)).collect(),

@@ -1,6 +1,7 @@
 //! The clearance of robots between two ticks, from each other and from solids: the least ever, by the way that each has gone.
 
 use super::Filter;
+use super::cell::{foot, length};
 use crate::flock::vectors::Vectors;
 
 /// Chords that stand for the way of a member that changes its velocity evenly: between them it is off by less than `a T^2 / 2048`.
@@ -55,21 +56,13 @@ impl Filter {
                     let (a, b) = (points.get(a), points.get(b));
                     [a[0] - b[0], a[1] - b[1]]
                 };
-                let gap = least_length(apart(before), apart(after)) - self.radii[a] - self.radii[b];
+                let gap =
+                    length(foot([apart(before), apart(after)], [0.0; 2])) - self.radii[a] - self.radii[b];
                 nearest[a] = nearest[a].min(gap);
                 nearest[b] = nearest[b].min(gap);
             }
         }
     }
-}
-
-/// Least length of a vector that goes straight from one to another.
-fn least_length(from: [f64; 2], to: [f64; 2]) -> f64 {
-    let way = [to[0] - from[0], to[1] - from[1]];
-    let square = way[0] * way[0] + way[1] * way[1];
-    let part =
-        if square > 0.0 { (-(from[0] * way[0] + from[1] * way[1]) / square).clamp(0.0, 1.0) } else { 0.0 };
-    f64::hypot(from[0] + part * way[0], from[1] + part * way[1])
 }
 
 #[cfg(test)]

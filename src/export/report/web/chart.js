@@ -60,7 +60,10 @@ export class Chart {
   drawMark(parent, { style, colour }, line, points) {
     const ink = inkOf(colour);
     if (style === "line" || style === "front") {
-      const d = line.map(([x, y], n) => `${n ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join("");
+      // What an axis cannot show, as a logarithmic one zeros, is a gap.
+      const isShown = (n) => line[n]?.every(Number.isFinite);
+      const part = ([x, y], n) => (isShown(n) ? `${isShown(n - 1) ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}` : "");
+      const d = line.map(part).join("");
       svg("path", { d, fill: "none", stroke: ink, "stroke-width": style === "line" ? 1.8 : 1.2, "stroke-linejoin": "round" }, parent);
     }
     if (style === "line") return;
@@ -79,7 +82,9 @@ export class Chart {
   range(k) {
     const axis = k === 0 ? this.plot.x : this.plot.y;
     const count = (value) => (axis.log ? Math.log10(value) : value);
-    const values = this.shown().flatMap((series) => series.points.map((point) => count(point[k])));
+    // A line that comes to zero goes on, where the axis of its values has none.
+    const points = this.shown().flatMap((series) => series.points.filter((point) => Number.isFinite(point[1 - k])));
+    const values = points.map((point) => count(point[k]));
     if (k === 0) values.push(...this.plot.landmarks.map((mark) => count(mark.x)));
     const finite = values.filter(Number.isFinite);
     let [low, high] = finite.reduce(([l, h], v) => [Math.min(l, v), Math.max(h, v)], [Infinity, -Infinity]);
@@ -118,8 +123,8 @@ export class Chart {
       svg("text", attributes, root).textContent = name;
     });
     for (const series of this.shown()) {
-      const places = series.points.map((point) => [x(point[0]), y(point[1])]).filter((place) => place.every(Number.isFinite));
-      this.drawMark(root, series, places, places);
+      const places = series.points.map((point) => [x(point[0]), y(point[1])]);
+      this.drawMark(root, series, places, places.filter((place) => place.every(Number.isFinite)));
     }
     this.cursor = svg("line", { y1: room.top, y2: room.top + size[1], stroke: "var(--accent)", "stroke-width": 1.5, visibility: "hidden" }, root);
     this.ring = svg("circle", { r: 8, fill: "none", stroke: "var(--ink)", "stroke-width": 2, visibility: "hidden" }, root);

@@ -80,7 +80,10 @@ export function multiples(low, high, step) {
 // Powers of ten from low to high, no more than `most`; round values where the range holds fewer than two.
 export function logTicks(low, high, most) {
   const [from, to] = [Math.ceil(Math.log10(low) - 1e-9), Math.floor(Math.log10(high) + 1e-9)];
-  if (to - from < 1) return [1, 2, 5, 10, 20, 50].map((m) => m * 10 ** (from - 1)).filter((v) => v >= low && v <= high);
+  if (to - from < 1) {
+    const round = [1, 2, 5, 10, 20, 50].map((m) => m * 10 ** (from - 1)).filter((v) => v >= low && v <= high);
+    return round.length > 1 ? round : ticks(low, high, most);
+  }
   const every = Math.ceil((to - from + 1) / most);
   const values = [];
   for (let k = from; k <= to; k += every) values.push(10 ** k);
