@@ -179,7 +179,8 @@ impl Crystal {
 
     /// The weights that cells of this material give an interior particle, nearest neighbours first.
     pub fn material(lattice: &Lattice, elastic: &Elastic) -> Result<Self, HomogeniseError> {
-        let cell = templates(lattice).swap_remove(0);
+        let templates = templates(lattice);
+        let cell = &templates[0];
         // Of an oblique lattice whose cell spans so many columns, sums would leave the integers.
         if cell.iter().flatten().any(|steps| steps.abs() > i32::MAX >> 5) {
             return Err(HomogeniseError::Range);
@@ -190,7 +191,7 @@ impl Crystal {
         sites.push([0, 0]);
         sites.retain(|&site| lattice.is_site(site));
         sites.sort_unstable();
-        let cells = Cells::of_sites(lattice, &sites, |_| true);
+        let cells = Cells::of_sites(lattice, &templates, &sites, |_| true);
         let bonds = (0..lattice.sublattices()).map(|sublattice| {
             let [column, row] = lattice.site_of_sublattice(sublattice);
             let middle = sites.partition_point(|&site| site < [column, row]);
