@@ -9,12 +9,12 @@ use crate::ranks::Team;
 
 /// Has each rank write the file of its name into the `folder`, which the first rank has and all must see. What one of them
 /// cannot write is an error of all.
-pub(super) fn write_each(
+pub(super) fn write_each<T>(
     folder: Option<&Path>,
     name: impl Fn(usize) -> String,
     team: &Team,
-    write: impl FnOnce(&Path) -> Result<(), ExportError>,
-) -> Result<(), ExportError> {
+    write: impl FnOnce(&Path) -> Result<T, ExportError>,
+) -> Result<T, ExportError> {
     let own = folder.map_or(&b""[..], |folder| folder.as_os_str().as_encoded_bytes());
     let first = team.each_bytes(own).swap_remove(0);
     let folder = PathBuf::from(OsString::from_vec(first));

@@ -149,9 +149,8 @@ impl VtkSeries {
     fn write_pieces(&mut self, engine: &Engine, team: &Team) -> Result<(), ExportError> {
         let frame = (engine.step(), Some(team.count()));
         let list = &self.paths(&[frame])[0];
-        write_own_piece((list.parent(), team), engine)?;
-        let has_stresses = engine.elastic().is_some() && engine.cells().is_some();
-        write_file(list, list_of_pieces(engine.step(), team.count(), has_stresses))?;
+        let listed = write_own_piece((list.parent(), team), engine)?;
+        write_file(list, list_of_pieces(engine.step(), team.count(), listed))?;
         self.frames.push(frame);
         Ok(())
     }
@@ -205,52 +204,35 @@ fn piece_name(step: usize, rank: usize) -> String {
 /// # Errors
 /// A piece that cannot be written, by any rank.
 pub fn write_piece(engine: &Engine, team: &Team) -> Result<(), ExportError> {
-    write_own_piece((None, team), engine)
+    write_own_piece((None, team), engine).map(|_| ())
 }
 
-fn write_own_piece((folder, team): (Option<&Path>, &Team), engine: &Engine) -> Result<(), ExportError> {
+fn write_own_piece((folder, team): (Option<&Path>, &Team), engine: &Engine) -> Result<Listed, ExportError> {
     let name = |rank: usize| piece_name(engine.step(), rank);
     let values = Values::of(engine);
     let write = |path: &Path| write_frame(path, &values).map_err(ExportError::io("write", path));
     write_each(folder, name, team, write)
 }
 
+/// What a list of pieces says of the arrays of points and of cells.
+type Listed = [String; 2];
+
 /// What all pieces of a frame have in common, and their names.
-fn list_of_pieces(step: usize, ranks: usize, has_stresses: bool) -> String {
-    let array = |kind: &str, name: &str| format!("<PDataArray type=\"{kind}\" Name=\"{name}\"/>\n");
-    let three = |name: &str, more: &str| {
-        format!("<PDataArray type=\"Float64\" Name=\"{name}\" NumberOfComponents=\"3\"{more}/>\n")
-    };
-    let of_stresses = [three("stress", PLANE), array("Float64", "von_mises")].concat();
-    let stresses = if has_stresses { of_stresses } else { String::new() };
-    let points = [
-        array("UInt8", GHOSTS),
-        array("Int64", "id"),
-        array("UInt8", "role"),
-        three("displacement", ""),
-        array("Float64", "pe1"),
-        array("Float64", "pe2"),
-        three("strain", PLANE),
-        array("Float64", "rotation"),
-        stresses.clone(),
-    ];
-    let cells = [array("UInt8", "broken"), array("Float64", "stretch"), stresses];
+fn list_of_pieces(step: usize, ranks: usize, [points, cells]: Listed) -> String {
     let pieces = (0..ranks).map(|rank| format!("<Piece Source=\"{}\"/>\n", piece_name(step, rank)));
     let attributes =
         "type=\"PUnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\"";
     format!(
         "<?xml version=\"1.0\"?>\n<VTKFile {attributes}>\n<PUnstructuredGrid GhostLevel=\"0\">\n\
-         <PPointData Scalars=\"pe1\" Vectors=\"displacement\">\n{}</PPointData>\n\
-         <PCellData Scalars=\"broken\">\n{}</PCellData>\n<PPoints>\n{}</PPoints>\n{}\
+         <PPointData Scalars=\"pe1\" Vectors=\"displacement\">\n{points}</PPointData>\n\
+         <PCellData Scalars=\"broken\">\n{cells}</PCellData>\n\
+         <PPoints>\n<PDataArray type=\"Float64\" Name=\"Points\" NumberOfComponents=\"3\"/>\n</PPoints>\n{}\
          </PUnstructuredGrid>\n</VTKFile>\n",
-        points.concat(),
-        cells.concat(),
-        three("Points", ""),
         pieces.collect::<String>()
     )
 }
 
-fn write_frame(path: &Path, values: &Values<'_>) -> io::Result<()> {
+fn write_frame(path: &Path, values: &Values<'_>) -> io::Result<Listed> {
     let mut out = create_buffered(path)?;
     let engine = values.engine;
     let grid = Grid::of(engine);
@@ -262,15 +244,16 @@ fn write_frame(path: &Path, values: &Values<'_>) -> io::Result<()> {
     writeln!(out, "<!-- step {}; role: {roles} -->", engine.step())?;
     writeln!(out, "<UnstructuredGrid>")?;
     writeln!(out, "<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{}\">", grid.count())?;
-    write_point_data(&mut out, values, &grid.points)?;
-    grid.write_data(&mut out, values)?;
+    let of_points = write_point_data(&mut out, values, &grid.points)?;
+    let of_cells = grid.write_data(&mut out, values)?;
     writeln!(out, "<Points>")?;
     let places = grid.points.clone().map(|row| engine.present().get(engine.body().in_row(row)));
-    Arrays { out: &mut out, count: points }.threes("Points", "", places.map(|[x, y]| [x, y, 0.0]))?;
+    Arrays::new(&mut out, points).threes("Points", "", places.map(|[x, y]| [x, y, 0.0]))?;
     writeln!(out, "</Points>")?;
     grid.write(&mut out, engine.body())?;
     writeln!(out, "</Piece>\n</UnstructuredGrid>\n</VTKFile>")?;
-    out.flush()
+    out.flush()?;
+    Ok([of_points, of_cells])
 }
 
 /// Numbers of particles that are found from those around them: what stands around those of other parts the others know.
@@ -325,12 +308,12 @@ impl<'a> Values<'a> {
     }
 }
 
-fn write_point_data(out: &mut impl Write, values: &Values<'_>, rows: &Range<usize>) -> io::Result<()> {
+fn write_point_data(out: &mut impl Write, values: &Values<'_>, rows: &Range<usize>) -> io::Result<String> {
     let engine = values.engine;
     let (count, body) = (rows.len(), engine.body());
     let rows = || rows.clone().map(|row| body.in_row(row));
     writeln!(out, "<PointData Scalars=\"pe1\" Vectors=\"displacement\">")?;
-    let mut arrays = Arrays { out: &mut *out, count };
+    let mut arrays = Arrays::new(out, count);
     if body.part.is_some() {
         // Points of other parts, at the ends of bonds that lead there.
         arrays.bytes(GHOSTS, rows().map(|i| u8::from(!body.owned().contains(&i))))?;
@@ -349,7 +332,8 @@ fn write_point_data(out: &mut impl Write, values: &Values<'_>, rows: &Range<usiz
     if values.stresses.is_some() {
         arrays.stresses(rows().map(|i| values.stress(i)))?;
     }
-    writeln!(out, "</PointData>")
+    writeln!(arrays.out, "</PointData>")?;
+    Ok(arrays.listed)
 }
 
 fn with_von_mises(stress: &StressState) -> [f64; 4] {
@@ -404,7 +388,7 @@ impl<'a> Grid<'a> {
         self.vertices.len() + self.bonds.len() + self.polygons.len()
     }
 
-    fn write_data(&self, out: &mut impl Write, values: &Values<'_>) -> io::Result<()> {
+    fn write_data(&self, out: &mut impl Write, values: &Values<'_>) -> io::Result<String> {
         let Values { engine, stresses, .. } = values;
         let bonds = engine.flock().bonds.as_ref();
         let is_broken = |&(bond, _): &(usize, _)| bonds.is_some_and(|bonds| bonds.is_broken(bond));
@@ -415,7 +399,7 @@ impl<'a> Grid<'a> {
         let polygons = self.polygons.len();
         let scalars = if self.bonds.is_empty() && stresses.is_some() { "von_mises" } else { "broken" };
         writeln!(out, "<CellData Scalars=\"{scalars}\">")?;
-        let mut arrays = Arrays { out: &mut *out, count: self.count() };
+        let mut arrays = Arrays::new(out, self.count());
         let broken = self.bonds.iter().map(|bond| u8::from(is_broken(bond)));
         let vertices = self.vertices.len();
         let (before, after) = (std::iter::repeat_n(0, vertices), std::iter::repeat_n(0, polygons));
@@ -434,7 +418,8 @@ impl<'a> Grid<'a> {
             let own = own.into_iter();
             arrays.stresses(particles.chain(self.bonds.iter().map(between)).chain(own))?;
         }
-        writeln!(out, "</CellData>")
+        writeln!(arrays.out, "</CellData>")?;
+        Ok(arrays.listed)
     }
 
     fn write(&self, out: &mut impl Write, body: &Body) -> io::Result<()> {
@@ -448,7 +433,7 @@ impl<'a> Grid<'a> {
         let vertices = self.vertices.len();
         let own = self.vertices.clone().map(|row| row as i64 - first);
         let connected = own.chain(bonds().map(row)).chain(self.polygons().flatten().map(row));
-        Arrays { out: &mut *out, count: vertices + 2 * self.bonds.len() + corners }
+        Arrays::new(&mut *out, vertices + 2 * self.bonds.len() + corners)
             .integers("connectivity", connected)?;
         let sizes = std::iter::repeat_n(1, vertices)
             .chain(std::iter::repeat_n(2, self.bonds.len()))
@@ -457,7 +442,7 @@ impl<'a> Grid<'a> {
             *end += size as i64;
             Some(*end)
         });
-        let mut arrays = Arrays { out: &mut *out, count: self.count() };
+        let mut arrays = Arrays::new(&mut *out, self.count());
         arrays.integers("offsets", ends)?;
         let kind = |cell: &[u32]| match cell.len() {
             3 => TRIANGLE,
@@ -479,30 +464,31 @@ const PLANE: &str = " ComponentName0=\"xx\" ComponentName1=\"yy\" ComponentName2
 struct Arrays<'a, W> {
     out: &'a mut W,
     count: usize,
+    /// What a list of pieces says of those that have been written.
+    listed: String,
 }
 
-impl<W: Write> Arrays<'_, W> {
+impl<'a, W: Write> Arrays<'a, W> {
+    fn new(out: &'a mut W, count: usize) -> Self {
+        Self { out, count, listed: String::new() }
+    }
+
     fn bytes(&mut self, name: &str, values: impl Iterator<Item = u8>) -> io::Result<()> {
-        array(self.out, &format!("type=\"UInt8\" Name=\"{name}\""), self.count, values.map(u8::to_le_bytes))
+        self.array(&format!("type=\"UInt8\" Name=\"{name}\""), self.count, values.map(u8::to_le_bytes))
     }
 
     fn integers(&mut self, name: &str, values: impl Iterator<Item = i64>) -> io::Result<()> {
-        array(self.out, &format!("type=\"Int64\" Name=\"{name}\""), self.count, values.map(i64::to_le_bytes))
+        self.array(&format!("type=\"Int64\" Name=\"{name}\""), self.count, values.map(i64::to_le_bytes))
     }
 
     fn floats(&mut self, name: &str, values: impl Iterator<Item = f64>) -> io::Result<()> {
-        array(
-            self.out,
-            &format!("type=\"Float64\" Name=\"{name}\""),
-            self.count,
-            values.map(f64::to_le_bytes),
-        )
+        self.array(&format!("type=\"Float64\" Name=\"{name}\""), self.count, values.map(f64::to_le_bytes))
     }
 
     /// Vectors, or with [`PLANE`] tensors.
     fn threes(&mut self, name: &str, more: &str, values: impl Iterator<Item = [f64; 3]>) -> io::Result<()> {
         let attributes = format!("type=\"Float64\" Name=\"{name}\" NumberOfComponents=\"3\"{more}");
-        array(self.out, &attributes, 3 * self.count, values.flatten().map(f64::to_le_bytes))
+        self.array(&attributes, 3 * self.count, values.flatten().map(f64::to_le_bytes))
     }
 
     /// Components and von Mises stress.
@@ -510,22 +496,23 @@ impl<W: Write> Arrays<'_, W> {
         self.threes("stress", PLANE, stresses.clone().map(|[xx, yy, xy, _]| [xx, yy, xy]))?;
         self.floats("von_mises", stresses.map(|stress| stress[3]))
     }
-}
 
-/// One array of `count` values of `SIZE` bytes, after the length that the format asks for.
-fn array<const SIZE: usize>(
-    out: &mut impl Write,
-    attributes: &str,
-    count: usize,
-    values: impl Iterator<Item = [u8; SIZE]>,
-) -> io::Result<()> {
-    write!(out, "<DataArray {attributes} format=\"binary\">")?;
-    let mut encoder = EncoderWriter::new(&mut *out, &STANDARD);
-    encoder.write_all(&((count * SIZE) as u64).to_le_bytes())?;
-    for value in values {
-        encoder.write_all(&value)?;
+    /// One array of `count` values of `SIZE` bytes, after the length that the format asks for.
+    fn array<const SIZE: usize>(
+        &mut self,
+        attributes: &str,
+        count: usize,
+        values: impl Iterator<Item = [u8; SIZE]>,
+    ) -> io::Result<()> {
+        self.listed += &format!("<PDataArray {attributes}/>\n");
+        write!(self.out, "<DataArray {attributes} format=\"binary\">")?;
+        let mut encoder = EncoderWriter::new(&mut *self.out, &STANDARD);
+        encoder.write_all(&((count * SIZE) as u64).to_le_bytes())?;
+        for value in values {
+            encoder.write_all(&value)?;
+        }
+        encoder.finish()?;
+        drop(encoder);
+        writeln!(self.out, "</DataArray>")
     }
-    encoder.finish()?;
-    drop(encoder);
-    writeln!(out, "</DataArray>")
 }

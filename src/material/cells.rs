@@ -61,13 +61,19 @@ impl Cells {
     /// All cells whose corners are particles of the body and not of its frame, in the order of their
     /// first corner's particle.
     pub fn of_body(body: &Body) -> Self {
-        Self::of_sites(&body.lattice, &body.sites, |i| !body.is_frame[i])
+        let templates = templates(&body.lattice);
+        Self::of_sites(&body.lattice, &templates, &body.sites, |i| !body.is_frame[i])
     }
 
-    /// All cells whose corners are at sites that take part, in the order of `sites`, which is lexicographic.
-    pub fn of_sites(lattice: &Lattice, sites: &[Site], takes_part: impl Fn(usize) -> bool) -> Self {
-        let templates = templates(lattice);
-        let mut cells = Self::of_lattice(lattice, 1);
+    /// All cells like these [`templates`] whose corners are at sites that take part, in the order of `sites`, which is
+    /// lexicographic.
+    pub fn of_sites(
+        lattice: &Lattice,
+        templates: &[Vec<Site>],
+        sites: &[Site],
+        takes_part: impl Fn(usize) -> bool,
+    ) -> Self {
+        let mut cells = Self::of_kinds(shapes(lattice, templates));
         // Corners ascend as the sites do that they belong to: each is looked for from where it was last.
         let mut last: Vec<Vec<usize>> = templates.iter().map(|template| vec![0; template.len()]).collect();
         let mut found = Vec::new();
@@ -106,8 +112,7 @@ impl Cells {
 
     /// No cells yet, of the kinds that a lattice has: the cells that belong to a site, in each of so many regions.
     pub fn of_lattice(lattice: &Lattice, regions: usize) -> Self {
-        let shape = |t: &Vec<Site>| t.iter().map(|&corner| lattice.vector(corner)).collect();
-        let shapes: Vec<Vec<[f64; 2]>> = templates(lattice).iter().map(shape).collect();
+        let shapes = shapes(lattice, &templates(lattice));
         let region = (0..regions as u32).flat_map(|region| vec![region; shapes.len()]).collect();
         let shapes = (0..regions).flat_map(|_| shapes.clone()).collect();
         Self { region, ..Self::of_kinds(shapes) }
@@ -410,12 +415,7 @@ pub fn templates(lattice: &Lattice) -> Vec<Vec<Site>> {
             let [p, q] = shortest_translations(lattice);
             vec![vec![[0, 0], p, [p[0] + q[0], p[1] + q[1]], q]]
         }
-        LatticeKind::Hexagonal { .. } => {
-            let mut around = lattice.first_neighbours(0);
-            around.sort_by(|&a, &b| angle(lattice, a).total_cmp(&angle(lattice, b)));
-            let triangle = |k: usize| vec![[0, 0], around[k], around[k + 1]];
-            vec![triangle(0), triangle(1)]
-        }
+        LatticeKind::Hexagonal { .. } => triangles(lattice).to_vec(),
     };
     for template in &mut templates {
         let [a, b] = [1, 2].map(|k| lattice.vector(template[k]));
@@ -424,6 +424,18 @@ pub fn templates(lattice: &Lattice) -> Vec<Vec<Site>> {
         }
     }
     templates
+}
+
+/// The triangles between first neighbours that belong to a site, where there are six of these; as [`templates`].
+pub fn triangles(lattice: &Lattice) -> [Vec<Site>; 2] {
+    let mut around = lattice.first_neighbours(0);
+    around.sort_by(|&a, &b| angle(lattice, a).total_cmp(&angle(lattice, b)));
+    [0, 1].map(|k| vec![[0, 0], around[k], around[k + 1]])
+}
+
+/// Corners of these templates relative to the first \[length\], shape \[kinds, corners of the kind\].
+fn shapes(lattice: &Lattice, templates: &[Vec<Site>]) -> Vec<Vec<[f64; 2]>> {
+    templates.iter().map(|t| t.iter().map(|&corner| lattice.vector(corner)).collect()).collect()
 }
 
 fn angle(lattice: &Lattice, offset: Site) -> f64 {

@@ -17,16 +17,16 @@
 //! symmetric; a scalar rule on a lattice of less than four-fold symmetry has an acoustic tensor that
 //! belongs to no such stress, which [`Effective::misfit`] reports.
 
-mod bonds;
+use std::collections::BTreeMap;
 
 use nalgebra::{Complex, DMatrix, Matrix2, Matrix3, Vector2};
 
-use self::bonds::{add, add_averaged};
 use super::Block;
-use super::cells::templates;
+use super::cells::{Cells, templates};
 use super::elastic::{Elastic, Voigt};
-use super::stiffness::{ShapeError, element_of};
-use crate::flock::lattice::{Lattice, Site};
+use super::stiffness::ShapeError;
+use super::weights::{WeightsError, bonds_of};
+use crate::flock::lattice::{Lattice, Site, ring};
 
 /// A neighbour of an interior particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -179,34 +179,36 @@ impl Crystal {
 
     /// The weights that cells of this material give an interior particle, nearest neighbours first.
     pub fn material(lattice: &Lattice, elastic: &Elastic) -> Result<Self, HomogeniseError> {
-        let mut blocks: Vec<Vec<(Site, Block)>> = vec![Vec::new(); lattice.sublattices()];
-        for template in templates(lattice) {
-            let shape: Vec<[f64; 2]> = template.iter().map(|&corner| lattice.vector(corner)).collect();
-            let k = element_of(&shape, elastic, false)?;
-            for (a, own) in template.iter().enumerate() {
-                let row = &mut blocks[lattice.sublattice(*own)];
-                for (b, other) in template.iter().enumerate().filter(|&(b, _)| b != a) {
-                    let offset = [other[0] - own[0], other[1] - own[1]];
-                    let entry = |x: usize, y: usize| -k[(2 * a + x, 2 * b + y)];
-                    add(row, offset, &[[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]);
-                }
-            }
+        let templates = templates(lattice);
+        let cell = &templates[0];
+        // Of an oblique lattice whose cell spans so many columns, sums would leave the integers.
+        if cell.iter().flatten().any(|steps| steps.abs() > i32::MAX >> 5) {
+            return Err(HomogeniseError::Range);
         }
-        if let Some(lambda) = elastic.averaged_dilatation() {
-            for (sublattice, row) in blocks.iter_mut().enumerate() {
-                add_averaged(lattice, lambda, lattice.site_of_sublattice(sublattice), row);
-            }
-        }
-        let bonds = blocks.iter().enumerate().map(|(sublattice, row)| {
-            let mut order: Vec<Site> = row.iter().map(|&(offset, _)| offset).collect();
+        // Eight sides of a cell either way, which of a honeycomb are four cells: where dilatations are averaged, a particle in
+        // the middle feels those two cells away, and around these no cell is missing, so that none is on an edge.
+        let mut sites = ring(&[cell[1], cell[cell.len() - 1]], 8);
+        sites.push([0, 0]);
+        sites.retain(|&site| lattice.is_site(site));
+        sites.sort_unstable();
+        let cells = Cells::of_sites(lattice, &templates, &sites, |_| true);
+        let bonds = (0..lattice.sublattices()).map(|sublattice| {
+            let [column, row] = lattice.site_of_sublattice(sublattice);
+            let middle = sites.partition_point(|&site| site < [column, row]);
+            let found = bonds_of(middle, (&cells, sites.len()), elastic).map_err(|error| match error {
+                WeightsError::Shape { reason, .. } => HomogeniseError::Shape(reason),
+                // Every particle that shares a cell is there and is seen.
+                _ => HomogeniseError::Singular { sublattice },
+            })?;
+            let offset = |j: u32| [sites[j as usize][0] - column, sites[j as usize][1] - row];
+            let blocks: BTreeMap<Site, Block> =
+                found.into_iter().map(|(j, block)| (offset(j), block)).collect();
+            let mut order: Vec<Site> = blocks.keys().copied().collect();
             lattice.sort_nearest_first(&mut order);
-            let find = |offset: Site| row.iter().find(|(o, _)| *o == offset).map(|(_, block)| *block);
-            order
-                .into_iter()
-                .filter_map(|offset| Some(bond(lattice, sublattice, offset, find(offset)?)))
-                .collect()
+            let bond = |offset| bond(lattice, sublattice, offset, blocks[&offset]);
+            Ok::<Vec<Bond>, HomogeniseError>(order.into_iter().map(bond).collect())
         });
-        Ok(Self { bonds: bonds.collect(), primitive: primitive(lattice) })
+        Ok(Self { bonds: bonds.collect::<Result<_, _>>()?, primitive: primitive(lattice) })
     }
 
     /// `D = sum_j K_j` of a sublattice \[force / length\].

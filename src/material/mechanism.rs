@@ -346,13 +346,14 @@ impl Hinge {
 mod tests {
     use super::*;
     use crate::flock::lattice::{Lattice, LatticeKind, Site};
+    use crate::material::cells::templates;
 
     /// Unit squares with these lower left corners, and the sites of their particles.
     fn squares(of: &[Site]) -> (Cells, Vectors, Vec<Site>) {
         let corners = |&[i, j]: &Site| [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]];
         let sites = distinct(of.iter().flat_map(corners));
         let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0; 2], 0.0);
-        let mut cells = Cells::of_sites(&lattice, &sites, |_| true);
+        let mut cells = Cells::of_sites(&lattice, &templates(&lattice), &sites, |_| true);
         // Sites around a hole make a cell in the hole too: keep those asked for.
         let keep: Vec<usize> =
             (0..cells.count()).filter(|&c| of.contains(&sites[cells.of(c)[0] as usize])).collect();

@@ -2,16 +2,14 @@
 
 mod assembly;
 
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use assembly::Assembly;
 
 use super::cells::Cells;
-use super::dilatation::Patches;
 use super::elastic::Elastic;
 use super::mechanism::{Mechanism, require_rigid};
-use super::stiffness::{ShapeError, mean_gradients};
+use super::stiffness::ShapeError;
 use crate::flock::block::{Block, apply, product};
 use crate::flock::body::Body;
 use crate::flock::cells_around::CellsAround;
@@ -133,18 +131,8 @@ impl MaterialWeights {
         if body.part.is_none() {
             require_rigid(cells, &incidence, &body.reference, |i| !body.is_frame[i])?;
         }
-        let elements = elements(cells, elastic)?;
-        let averaged = Patches::new(cells, &incidence, neighbours.count(), elastic);
-        let gradients = cells.shapes.iter().map(|shape| mean_gradients(shape)).collect();
-        let assembly = Assembly {
-            cells,
-            incidence: &incidence,
-            neighbours: &neighbours,
-            elements,
-            gradients,
-            averaged,
-            index: &|i| body.index(i),
-        };
+        let index = |i: usize| body.index(i);
+        let assembly = Assembly::new((cells, &incidence), &neighbours, elastic, &index)?;
         let (class, first) = assembly.classes();
         // Every row is summed over its own cells in their order: the same bits on any number of threads.
         // Collected before looking: the first error in the order of particles, not the first to be found.
@@ -215,14 +203,13 @@ impl MaterialWeights {
     }
 }
 
-/// Element stiffness of each shape.
-fn elements(cells: &Cells, elastic: &Elastic) -> Result<Vec<DMatrix<f64>>, WeightsError> {
-    let of_kind = |kind: usize| {
-        cells.element(kind, elastic).map_err(|reason| {
-            let cell = cells.kind.iter().position(|&k| k as usize == kind).map_or(0, |cell| cell + 1);
-            WeightsError::Shape { cell, reason }
-        })
-    };
-    let outcomes: Vec<_> = (0..cells.shapes.len()).into_par_iter().map(of_kind).collect();
-    outcomes.into_iter().collect()
+/// Those that one of `particles` particles feels, in order of index, and `K_ij` \[force / length\].
+pub(super) fn bonds_of(
+    particle: usize,
+    (cells, particles): (&Cells, usize),
+    elastic: &Elastic,
+) -> Result<Vec<(u32, Block)>, WeightsError> {
+    let (incidence, neighbours) = (cells.incidence(particles), cells.neighbours(particles, elastic));
+    let row = Assembly::new((cells, &incidence), &neighbours, elastic, &|i| i)?.row(particle)?;
+    Ok(neighbours.of(particle).iter().copied().zip(row.blocks).collect())
 }

@@ -29,7 +29,9 @@ fn files(folder: &Path) -> BTreeSet<String> {
 fn the_package_lies_where_ros_looks_for_it() {
     let folder = temporary();
     let said = done(&["install", "--prefix", "p"], folder.path());
-    assert!(said.contains("/p/setup.bash'"), "{said}");
+    assert!(said.contains("/p/setup.bash\n"), "{said}");
+    let said = done(&["install", "--prefix", "it's"], folder.path());
+    assert!(said.contains(r"/it'\''s/setup.bash'"), "{said}");
 
     let prefix = folder.path().join("p");
     let version =

@@ -71,7 +71,7 @@ impl Writer<'_> {
         let failed =
             made().write_in_parts(folder, (first, team), Err(ExportError::MissingFrame("full".into())));
         assert!(failed.is_err(), "{failed:?}");
-        for folder in folder {
+        if let Some(folder) = folder {
             let names = std::fs::read_dir(folder).expect("listed").flatten().map(|entry| entry.file_name());
             let left: Vec<_> =
                 names.filter(|name| name.to_string_lossy().starts_with(checkpoint::FILE)).collect();

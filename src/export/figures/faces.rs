@@ -3,64 +3,29 @@
 use std::collections::HashSet;
 
 use crate::flock::body::Body;
-use crate::flock::lattice::Site;
+use crate::flock::lattice::LatticeKind;
+use crate::material::cells::{Cells, templates, triangles};
 
 /// Faces whose corners are all marked in `included` and no two of whose corners are a broken pair;
 /// indices of particles, anticlockwise in the reference configuration.
 pub fn faces(body: &Body, included: &[bool], broken: &[[u32; 2]]) -> Vec<Vec<u32>> {
-    let around: Vec<Vec<Site>> = (0..body.lattice.sublattices()).map(|s| by_angle(body, s)).collect();
+    let templates = match body.lattice.kind() {
+        // Rhombs and parallelograms would leave notches at edges that zigzag.
+        LatticeKind::CentredRectangular { .. } | LatticeKind::Oblique { .. } => {
+            triangles(&body.lattice).to_vec()
+        }
+        _ => templates(&body.lattice),
+    };
+    let faces = Cells::of_sites(&body.lattice, &templates, &body.sites, |i| included[i]);
     let broken: HashSet<[u32; 2]> = broken.iter().copied().collect();
-    let is_whole = |face: &[u32]| {
+    let is_whole = |face: &&[u32]| {
         broken.is_empty()
             || face
                 .iter()
                 .enumerate()
                 .all(|(n, &a)| face[n + 1..].iter().all(|&b| !broken.contains(&[a.min(b), a.max(b)])))
     };
-    let mut found = Vec::new();
-    for &site in &body.sites {
-        for &direction in &around[body.lattice.sublattice(site)] {
-            if let Some(face) = face_left_of(body, &around, site, direction)
-                && face.iter().all(|&corner| included[corner as usize])
-                && is_whole(&face)
-            {
-                found.push(face);
-            }
-        }
-    }
-    found
-}
-
-/// First neighbours of a sublattice, anticlockwise.
-fn by_angle(body: &Body, sublattice: usize) -> Vec<Site> {
-    let angle = |offset: &Site| {
-        let [x, y] = body.lattice.vector(*offset);
-        y.atan2(x)
-    };
-    let mut offsets = body.lattice.first_neighbours(sublattice);
-    offsets.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
-    offsets
-}
-
-/// Walks around the face to the left of the edge that leaves `first` in `direction`; `None` if a
-/// corner is missing or comes before `first`, from where the same face is found too.
-fn face_left_of(body: &Body, around: &[Vec<Site>], first: Site, direction: Site) -> Option<Vec<u32>> {
-    let mut face = Vec::with_capacity(6);
-    let (mut site, mut direction) = (first, direction);
-    loop {
-        // Sites are numbered in their own order.
-        face.push(body.sites.binary_search(&site).ok()? as u32);
-        site = [site[0] + direction[0], site[1] + direction[1]];
-        if site == first {
-            return Some(face);
-        }
-        if site < first {
-            return None;
-        }
-        let leaving = &around[body.lattice.sublattice(site)];
-        let back = leaving.iter().position(|&offset| offset == [-direction[0], -direction[1]])?;
-        direction = leaving[(back + leaving.len() - 1) % leaving.len()];
-    }
+    faces.iter().filter(is_whole).map(<[u32]>::to_vec).collect()
 }
 
 #[cfg(test)]

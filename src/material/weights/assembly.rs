@@ -12,6 +12,8 @@ use crate::flock::neighbourhood::Neighbours;
 use crate::flock::rules::{Element, OWN};
 use crate::material::cells::{Cells, Incidence};
 use crate::material::dilatation::Patches;
+use crate::material::elastic::Elastic;
+use crate::material::stiffness::mean_gradients;
 
 /// Particles whose classes one thread finds at a time.
 const CHUNK: usize = 1 << 14;
@@ -53,7 +55,23 @@ enum Pattern {
     Long(Box<[u8]>),
 }
 
-impl Assembly<'_> {
+impl<'a> Assembly<'a> {
+    /// The parts for the rows of these cells in this material.
+    ///
+    /// # Errors
+    /// A cell that has no stiffness.
+    pub fn new(
+        (cells, incidence): (&'a Cells, &'a Incidence),
+        neighbours: &'a Neighbours,
+        elastic: &Elastic,
+        index: &'a (dyn Fn(usize) -> usize + Sync),
+    ) -> Result<Self, WeightsError> {
+        let elements = elements(cells, elastic)?;
+        let gradients = cells.shapes.iter().map(|shape| mean_gradients(shape)).collect();
+        let averaged = Patches::new(cells, incidence, neighbours.count(), elastic);
+        Ok(Self { cells, incidence, neighbours, elements, gradients, averaged, index })
+    }
+
     /// Class of each particle, and the first particle of each class.
     pub fn classes(&self) -> (Vec<u32>, Vec<usize>) {
         let count = self.neighbours.count();
@@ -278,4 +296,16 @@ impl Assembly<'_> {
         }
         around
     }
+}
+
+/// Element stiffness of each shape.
+fn elements(cells: &Cells, elastic: &Elastic) -> Result<Vec<DMatrix<f64>>, WeightsError> {
+    let of_kind = |kind: usize| {
+        cells.element(kind, elastic).map_err(|reason| {
+            let cell = cells.kind.iter().position(|&k| k as usize == kind).map_or(0, |cell| cell + 1);
+            WeightsError::Shape { cell, reason }
+        })
+    };
+    let outcomes: Vec<_> = (0..cells.shapes.len()).into_par_iter().map(of_kind).collect();
+    outcomes.into_iter().collect()
 }
