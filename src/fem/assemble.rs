@@ -6,17 +6,17 @@
 //! eliminated, K_ff u_f = f_f - K_fc u_c; no penalty enters. Every sum runs in the order of cells, points
 //! and nodes, so the same input gives the same bits.
 
-use super::element::{GAUSS_3, Gradient, MAX_NODES, side_shape};
+use super::element::{GAUSS_3, Gradient, NODES, Rule, side_shape};
 use super::mesh::Mesh;
 use super::problem::{Problem, along_side};
 use super::solution::Solution;
 use super::strain::Strain;
 
-/// Number of displacement components of the largest cell.
-const MAX_DOFS: usize = 2 * MAX_NODES;
+/// Number of displacement components of a cell.
+const COMPONENTS: usize = 2 * NODES;
 
 /// Stiffness of one cell, components x and y of a node together [N/m]; only i >= j is filled.
-type CellMatrix = [[f64; MAX_DOFS]; MAX_DOFS];
+type CellMatrix = [[f64; COMPONENTS]; COMPONENTS];
 
 /// The reduced system: lower triangle by columns, right-hand side, and where each component went.
 pub(crate) struct System {
@@ -32,7 +32,7 @@ pub(crate) struct System {
     pub load: Vec<f64>,
 }
 
-/// Builds the reduced system; `prescribed` as from [`Problem::prescribed`].
+/// Builds the reduced system.
 pub(crate) fn assemble(problem: &Problem, prescribed: &[Option<f64>]) -> System {
     assemble_for(problem, prescribed, &nodal_loads(problem), None)
 }
@@ -92,34 +92,39 @@ fn pattern(mesh: &Mesh, unknown: &[Option<usize>], count: usize) -> (Vec<usize>,
 
 impl System {
     fn add_cells(&mut self, problem: &Problem, prescribed: &[Option<f64>], solved: Option<&Solution>) {
-        let (mesh, n) = (&problem.mesh, problem.mesh.kind().nodes());
-        let rule = mesh.kind().stiffness_rule();
+        let (mesh, rule) = (&problem.mesh, Rule::of_stiffness());
         for cell in 0..mesh.cell_count() {
             let at = mesh.positions(cell);
-            let mut k = [[0.0; MAX_DOFS]; MAX_DOFS];
+            let mut k = [[0.0; COMPONENTS]; COMPONENTS];
             let material = problem.inclusions.material(cell, &problem.material);
             for (shape, weight) in &rule.points {
-                let g = shape.gradient(&at[..n]);
+                let g = shape.gradient(&at);
                 let (d, weight) = (material.stiffness(), weight * g.det);
                 match solved {
-                    None => add_stiffness(&mut k, &g, n, d, weight),
+                    None => add_stiffness(&mut k, &g, d, weight),
                     Some(solved) => {
-                        let h = g.of(&solved.of_cell(cell)[..n]);
-                        add_tangent(&mut k, &g, n, &Strain::Stretch.tangent(h, d), weight);
+                        let h = g.of(&solved.of_cell(cell));
+                        add_tangent(&mut k, &g, &Strain::Stretch.tangent(h, d), weight);
                     }
                 }
             }
-            let mut component = [0; MAX_DOFS];
+            let mut component = [0; COMPONENTS];
             for (a, &node) in mesh.cell(cell).iter().enumerate() {
                 component[2 * a] = 2 * node as usize;
                 component[2 * a + 1] = 2 * node as usize + 1;
             }
-            self.scatter(&k, &component[..2 * n], problem.material.thickness(), prescribed);
+            self.scatter(&k, &component, problem.material.thickness(), prescribed);
         }
     }
 
-    fn scatter(&mut self, k: &CellMatrix, component: &[usize], thickness: f64, prescribed: &[Option<f64>]) {
-        for (i, j) in (0..component.len()).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+    fn scatter(
+        &mut self,
+        k: &CellMatrix,
+        component: &[usize; COMPONENTS],
+        thickness: f64,
+        prescribed: &[Option<f64>],
+    ) {
+        for (i, j) in (0..COMPONENTS).flat_map(|i| (0..=i).map(move |j| (i, j))) {
             let (a, b, value) = (component[i], component[j], thickness * k[i][j]);
             match (self.unknown[a], self.unknown[b]) {
                 (Some(p), Some(q)) => {
@@ -137,12 +142,12 @@ impl System {
 }
 
 /// Adds `weight` B' D B. The column of B of node a is [dx, 0, dy] for x and [0, dy, dx] for y.
-fn add_stiffness(k: &mut CellMatrix, g: &Gradient, n: usize, d: &[[f64; 3]; 3], weight: f64) {
-    for b in 0..n {
+fn add_stiffness(k: &mut CellMatrix, g: &Gradient, d: &[[f64; 3]; 3], weight: f64) {
+    for b in 0..NODES {
         let (bx, by) = (weight * g.dx[b], weight * g.dy[b]);
         let sx = [0, 1, 2].map(|r| d[r][0] * bx + d[r][2] * by);
         let sy = [0, 1, 2].map(|r| d[r][1] * by + d[r][2] * bx);
-        for a in b..n {
+        for a in b..NODES {
             k[2 * a][2 * b] += g.dx[a] * sx[0] + g.dy[a] * sx[2];
             k[2 * a + 1][2 * b] += g.dy[a] * sx[1] + g.dx[a] * sx[2];
             k[2 * a][2 * b + 1] += g.dx[a] * sy[0] + g.dy[a] * sy[2];
@@ -152,11 +157,11 @@ fn add_stiffness(k: &mut CellMatrix, g: &Gradient, n: usize, d: &[[f64; 3]; 3], 
 }
 
 /// Adds `weight` times the second derivatives of the energy density `d`, by the gradient (xx, xy, yx, yy).
-fn add_tangent(k: &mut CellMatrix, g: &Gradient, n: usize, d: &[[f64; 4]; 4], weight: f64) {
-    for (b, j) in (0..n).flat_map(|b| [(b, 0), (b, 1)]) {
+fn add_tangent(k: &mut CellMatrix, g: &Gradient, d: &[[f64; 4]; 4], weight: f64) {
+    for (b, j) in (0..NODES).flat_map(|b| [(b, 0), (b, 1)]) {
         let (bx, by) = (weight * g.dx[b], weight * g.dy[b]);
         let s: [f64; 4] = std::array::from_fn(|r| d[r][2 * j] * bx + d[r][2 * j + 1] * by);
-        for (a, i) in (b..n).flat_map(|a| [(a, 0), (a, 1)]) {
+        for (a, i) in (b..NODES).flat_map(|a| [(a, 0), (a, 1)]) {
             k[2 * a + i][2 * b + j] += g.dx[a] * s[2 * i] + g.dy[a] * s[2 * i + 1];
         }
     }
@@ -170,24 +175,24 @@ pub(crate) fn nodal_loads(problem: &Problem) -> Vec<[f64; 2]> {
         load[node][0] += weight * force[0];
         load[node][1] += weight * force[1];
     };
-    for f in &problem.forces {
-        add(f.node as usize, 1.0, f.force);
+    for &(node, force) in &problem.forces {
+        add(node, 1.0, force);
     }
     for t in &problem.tractions {
         for ([s, weight], traction) in GAUSS_3.into_iter().zip(t.at_gauss) {
             let (_, tangent) = along_side(mesh, t.side, s);
             let area = thickness * weight * tangent[0].hypot(tangent[1]);
-            for (node, [shape, _]) in mesh.side_nodes(t.side).zip(side_shape(mesh.kind().degree(), s)) {
+            for (node, [shape, _]) in mesh.side_nodes(t.side).into_iter().zip(side_shape(s)) {
                 add(node, area * shape, traction);
             }
         }
     }
     if problem.body_force != [0.0; 2] {
-        let rule = mesh.kind().fine_rule();
+        let rule = Rule::fine();
         for cell in 0..mesh.cell_count() {
             let at = mesh.positions(cell);
             for (shape, weight) in &rule.points {
-                let volume = thickness * weight * shape.determinant(&at[..mesh.kind().nodes()]);
+                let volume = thickness * weight * shape.determinant(&at);
                 for (a, &node) in mesh.cell(cell).iter().enumerate() {
                     add(node as usize, volume * shape.n[a], problem.body_force);
                 }
@@ -200,55 +205,48 @@ pub(crate) fn nodal_loads(problem: &Problem) -> Vec<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fem::{CellKind, Material, Plane};
+    use crate::fem::{Material, Plane};
 
-    fn unit(kind: CellKind) -> Problem {
-        let mesh = Mesh::rectangle(kind, [1, 1], [0.0, 0.0], [1.0, 1.0]).unwrap();
+    fn unit() -> Problem {
+        let mesh = Mesh::rectangle([1, 1], [0.0, 0.0], [1.0, 1.0]);
         Problem::new(mesh, Material::isotropic(1.0, 0.3, Plane::Stress, 2.0).unwrap())
     }
 
     #[test]
-    fn a_uniform_traction_splits_as_half_half_and_one_sixth_four_sixths_one_sixth() {
-        for (kind, shares) in [(CellKind::Quad4, vec![0.5, 0.5]), (CellKind::Tri6, vec![1.0, 1.0, 4.0])] {
-            let mut p = unit(kind);
-            let side = p.mesh.boundary_where(|x, _| x == 1.0);
-            p.pull(&side, [0.0, 3.0]);
-            let (load, whole) = (nodal_loads(&p), 6.0 / shares.iter().sum::<f64>());
-            for (node, share) in p.mesh.side_nodes(side[0]).zip(shares) {
-                assert!((load[node][1] - whole * share).abs() < 1e-14 && load[node][0] == 0.0, "{kind:?}");
-            }
+    fn a_uniform_traction_splits_as_one_sixth_four_sixths_one_sixth() {
+        let mut p = unit();
+        let side = p.mesh.boundary_where(|x, _| x == 1.0);
+        p.pull(&side, |_, _| [0.0, 3.0]);
+        let load = nodal_loads(&p);
+        for (node, share) in p.mesh.side_nodes(side[0]).into_iter().zip([1.0, 1.0, 4.0]) {
+            assert!((load[node][1] - share).abs() < 1e-14 && load[node][0] == 0.0, "{:?}", load[node]);
         }
     }
 
     #[test]
     fn body_force_and_point_forces_add_up_to_their_resultant() {
-        for kind in CellKind::ALL {
-            let mut p = unit(kind);
-            p.body_force = [1.5, -9.81];
-            p.forces.push(crate::fem::PointForce { node: 2, force: [0.0, 1.0] });
-            let sum = nodal_loads(&p).iter().fold([0.0; 2], |s, f| [s[0] + f[0], s[1] + f[1]]);
-            assert!((sum[0] - 3.0).abs() < 1e-13 && (sum[1] + 18.62).abs() < 1e-13, "{kind:?}: {sum:?}");
-        }
+        let mut p = unit();
+        p.body_force = [1.5, -9.81];
+        p.forces.push((2, [0.0, 1.0]));
+        let sum = nodal_loads(&p).iter().fold([0.0; 2], |s, f| [s[0] + f[0], s[1] + f[1]]);
+        assert!((sum[0] - 3.0).abs() < 1e-13 && (sum[1] + 18.62).abs() < 1e-13, "{sum:?}");
     }
 
     #[test]
     fn the_free_stiffness_has_no_force_for_translations_and_rotation() {
-        for kind in CellKind::ALL {
-            let p = unit(kind);
-            let system = assemble(&p, &vec![None; 2 * p.mesh.node_count()]);
-            for motion in [|_, _| [1.0, 0.0], |_, _| [0.0, 1.0], |x: f64, y: f64| [-y, x]] {
-                let u: Vec<f64> =
-                    (0..p.mesh.node_count()).flat_map(|i| motion(p.mesh.x()[i], p.mesh.y()[i])).collect();
-                let mut force = vec![0.0; u.len()];
-                for j in 0..u.len() {
-                    for at in system.starts[j]..system.starts[j + 1] {
-                        let i = system.rows[at];
-                        force[i] += system.values[at] * u[j];
-                        force[j] += if i == j { 0.0 } else { system.values[at] * u[i] };
-                    }
+        let p = unit();
+        let system = assemble(&p, &p.prescribed);
+        for motion in [|_| [1.0, 0.0], |_| [0.0, 1.0], |[x, y]: [f64; 2]| [-y, x]] {
+            let u: Vec<f64> = p.mesh.points().into_iter().flat_map(motion).collect();
+            let mut force = vec![0.0; u.len()];
+            for j in 0..u.len() {
+                for at in system.starts[j]..system.starts[j + 1] {
+                    let i = system.rows[at];
+                    force[i] += system.values[at] * u[j];
+                    force[j] += if i == j { 0.0 } else { system.values[at] * u[i] };
                 }
-                assert!(force.iter().all(|f| f.abs() < 1e-13), "{kind:?}: {force:?}");
             }
+            assert!(force.iter().all(|f| f.abs() < 1e-13), "{force:?}");
         }
     }
 }

@@ -1,7 +1,5 @@
 //! Everything that can be wrong with a problem, named by index, value and allowed range.
 
-use super::problem::Axis;
-
 /// Errors of the finite-element room.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -34,16 +32,6 @@ pub enum FemError {
         /// The length that fits.
         expected: String,
     },
-    /// A node, cell or side number past the end.
-    #[error("{what} {index} does not exist: there are {count}")]
-    NoSuch {
-        /// "node", "cell" or "side".
-        what: &'static str,
-        /// The number asked for, from 0.
-        index: usize,
-        /// How many there are.
-        count: usize,
-    },
     /// A NaN or an infinity in the input.
     #[error("{what} {index} holds a value that is not finite")]
     NotFinite {
@@ -62,24 +50,6 @@ pub enum FemError {
         cell: usize,
         /// The smallest determinant found [m2 per reference area].
         determinant: f64,
-    },
-    /// A node without stiffness.
-    #[error("node {node} belongs to no cell")]
-    UnusedNode {
-        /// The node, from 0.
-        node: usize,
-    },
-    /// Two different values prescribed for the same displacement component.
-    #[error("node {node} is prescribed twice along {axis:?}: {first} and {second}")]
-    Conflict {
-        /// The node, from 0.
-        node: usize,
-        /// The component.
-        axis: Axis,
-        /// The value met first \[m\].
-        first: f64,
-        /// The value met later \[m\].
-        second: f64,
     },
     /// Too few prescribed displacements: a part can move as a rigid body.
     #[error("the part of the body around ({:.6}, {:.6}) is not held and free to {motion}", .at[0], .at[1])]

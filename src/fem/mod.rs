@@ -1,32 +1,14 @@
 //! The truth that flocking rules are compared with: plane linear elasticity by finite elements.
 //!
-//! This room does not use flocks. It takes a [`Mesh`] of triangles or quadrilaterals, linear or
-//! quadratic, a [`Material`] in plane stress or plane strain, what is held and what pulls (a [`Problem`]),
-//! and [`solve()`]s for the displacement in equilibrium at small strain by a sparse direct factorisation.
-//! The [`Solution`] gives stress at cells and points, energy, forces, and the displacement anywhere.
+//! This room does not use flocks. A body is given by its shape: a [`ShapeProblem`] has the outline, a [`Material`] in plane
+//! stress or plane strain, and holds and pulls parts of it. [`solve_shape()`] meshes it with quadratic triangles, solves
+//! for the displacement in equilibrium by a sparse direct factorisation, refines, and states its own error. The
+//! [`ShapeSolution`] gives displacement and stress anywhere, energy, and the reactions of supports.
 //!
 //! Units are the caller's as long as they are coherent; the docs say metre, newton, N/m2. The frame is the
 //! mesh's: x to the right, y up, nodes of a cell counter-clockwise, angles counter-clockwise. Voigt order
 //! is xx, yy, xy with the engineering shear strain. Results do not depend on a thread count: every sum has
 //! a fixed order and the factorisation runs on the calling thread.
-//!
-//! ```
-//! use flockform::fem::{CellKind, Material, Mesh, Plane, Problem, solve};
-//!
-//! let mesh = Mesh::rectangle(CellKind::Quad9, [22, 22], [10.0, 10.0], [21.0, 21.0])?;
-//! let material = Material::isotropic(1000.0, 0.33, Plane::Stress, 1.0)?;
-//! let (clamped, pulled) = (mesh.nodes_where(|x, _| x == 10.0), mesh.boundary_where(|x, _| x == 21.0));
-//! let mut beam = Problem::new(mesh, material);
-//! beam.prescribe(&clamped, |_, _| [0.0, 0.0]);
-//! beam.pull(&pulled, [0.0, 50.0]);
-//! let truth = solve(&beam)?;
-//! let tip = truth.displacements_at(&[21.0], &[15.5])?[0];
-//! assert!(tip[1] > 0.0);
-//! # Ok::<(), flockform::fem::FemError>(())
-//! ```
-//!
-//! A body can also be given by its shape alone: a [`ShapeProblem`] has the outline, holds and pulls parts of it, and
-//! [`solve_shape()`] meshes it, refines, and states its own error.
 //!
 //! ```
 //! use flockform::fem::{Effort, Material, Plane, ShapeProblem, solve_shape};
@@ -45,13 +27,15 @@
 //! # Ok::<(), flockform::fem::FemError>(())
 //! ```
 //!
-//! Files: `mesh` and `shapes` (the body), `outline_mesh` with `curves`, `size` and `delaunay` (a mesh of a shape),
-//! `shape_problem` and `shape_solve` (a shape, solved), `element` (shape functions, quadrature), `material`, `problem`
-//! (what is asked), `strain` (small, or of bodies that turn), `assemble` and `solve` (K u = f), `newton` (the same where
+//! Files: `shape_problem` and `shape_solve` (a shape, solved), `outline_mesh` with `curves`, `size` and `delaunay` (its mesh),
+//! `mesh`, `element` (shape functions, quadrature), `material`, `problem` (what is asked on one mesh),
+//! `strain` (small, or of bodies that turn), `assemble` and `solve` (K u = f), `newton` (the same where
 //! bodies turn), `solution` and `recover` (what follows), `locate`
 //! (which cell holds a point), `error`.
 
 mod assemble;
+#[cfg(test)]
+mod by_hand;
 mod curves;
 mod delaunay;
 mod element;
@@ -65,22 +49,17 @@ mod problem;
 mod recover;
 mod shape_problem;
 mod shape_solve;
-mod shapes;
 mod size;
 mod solution;
 mod solve;
 mod strain;
 
-pub use element::CellKind;
 pub use error::FemError;
-pub use material::{Inclusions, Material, Orthotropic, Plane, Stress};
-pub use mesh::{Mesh, Side};
-pub use outline_mesh::{MeshRequest, OutlineMesh, OutlineSide};
-pub use problem::{Axis, Fixed, PointForce, Problem, Traction};
+pub use material::{Material, Orthotropic, Plane, Stress};
+pub use mesh::Mesh;
 pub use shape_problem::{
     Field, Holding, PlaneRegion, PortionTraction, ShapeProblem, Support, TractionField, WayField,
 };
 pub use shape_solve::{Effort, EstimatedError, Level, Reaction, ShapeSolution, solve_shape};
 pub use solution::Solution;
-pub use solve::solve;
 pub use strain::Strain;

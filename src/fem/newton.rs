@@ -32,15 +32,14 @@ pub(crate) type Held<'a> = dyn Fn(f64) -> Vec<Option<f64>> + 'a;
 /// Supports go the way they are `led`, or straight to where they are prescribed.
 pub(crate) fn solve_turning(
     problem: &Problem,
-    prescribed: &[Option<f64>],
     start: Option<Vec<f64>>,
     led: Option<&Held<'_>>,
 ) -> Result<Solution, FemError> {
     let size_of = |prescribed: &[Option<f64>]| norm(&assemble(problem, prescribed).load);
     let looks = led.into_iter().flat_map(|led| (1..LOOKS).map(move |k| led(f64::from(k) / f64::from(LOOKS))));
-    let size = looks.map(|held| size_of(&held)).fold(size_of(prescribed), f64::max);
-    let way = Way { problem, prescribed, led, loads: nodal_loads(problem), size };
-    let at_rest = way.solution(vec![0.0; prescribed.len()])?;
+    let size = looks.map(|held| size_of(&held)).fold(size_of(&problem.prescribed), f64::max);
+    let way = Way { problem, led, loads: nodal_loads(problem), size };
+    let at_rest = way.solution(vec![0.0; problem.prescribed.len()])?;
     if way.size == 0.0 {
         return Ok(at_rest);
     }
@@ -65,7 +64,6 @@ pub(crate) fn solve_turning(
 
 struct Way<'a> {
     problem: &'a Problem,
-    prescribed: &'a [Option<f64>],
     led: Option<&'a Held<'a>>,
     /// \[N\], shape \[nodes\]
     loads: Vec<[f64; 2]>,
@@ -84,7 +82,7 @@ impl Way<'_> {
     fn held(&self, part: f64) -> Vec<Option<f64>> {
         match self.led {
             Some(led) if part < 1.0 => led(part),
-            _ => self.prescribed.iter().map(|end| end.map(|end| part * end)).collect(),
+            _ => self.problem.prescribed.iter().map(|end| end.map(|end| part * end)).collect(),
         }
     }
 

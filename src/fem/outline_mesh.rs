@@ -10,7 +10,7 @@ use std::collections::HashMap;
 
 use super::curves::{Curve, Curves};
 use super::delaunay::{Stretch, triangulate};
-use super::element::CellKind;
+use super::element::NODES;
 use super::error::FemError;
 use super::mesh::{Mesh, Side};
 use crate::geometry::Point;
@@ -147,11 +147,10 @@ impl OutlineMesh {
     ) -> Result<OutlineMesh, FemError> {
         let (mut x, mut y): (Vec<f64>, Vec<f64>) = vertices.iter().map(|p| (p[0], p[1])).unzip();
         let mut middles: HashMap<[u32; 2], u32> = HashMap::new();
-        let mut cells = Vec::with_capacity(6 * triangles.len());
+        let mut cells: Vec<[u32; NODES]> = Vec::with_capacity(triangles.len());
         let mut sides = Vec::new();
         for (cell, corners) in triangles.iter().enumerate() {
-            cells.extend_from_slice(corners);
-            for k in 0..3 {
+            let middles = [0, 1, 2].map(|k| {
                 let (a, b) = (corners[k], corners[(k + 1) % 3]);
                 let on_curve = stretches.get(&[a, b]).or_else(|| stretches.get(&[b, a]));
                 let node = *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
@@ -165,20 +164,22 @@ impl OutlineMesh {
                     y.push(my);
                     (x.len() - 1) as u32
                 });
-                cells.push(node);
                 if let Some(Stretch { curve, t }) = on_curve
                     && let Some([ring, piece]) = curves[*curve].on_outline
                 {
                     let side = Side { cell: cell as u32, side: k as u32 };
                     sides.push(OutlineSide { side, ring, piece, t: *t });
                 }
-            }
+                node
+            });
+            let ([a, b, c], [ab, bc, ca]) = (*corners, middles);
+            cells.push([a, b, c, ab, bc, ca]);
         }
-        let mesh = Mesh::new(CellKind::Tri6, x, y, cells)?;
+        let mesh = Mesh::new(x, y, cells)?;
         Ok(OutlineMesh { mesh, curves, stretches, singular, sides })
     }
 
-    /// The cells and nodes, of kind [`CellKind::Tri6`].
+    /// The cells and nodes.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }
@@ -200,14 +201,15 @@ fn first_part(grading: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fem::element::Rule;
     use crate::geometry::shape::Shape;
     use crate::geometry::specimen::Specimen;
 
     fn area(mesh: &Mesh) -> f64 {
-        let rule = CellKind::Tri6.fine_rule();
+        let rule = Rule::fine();
         let of_cell = |cell| -> f64 {
             let at = mesh.positions(cell);
-            rule.points.iter().map(|(shape, weight)| weight * shape.determinant(&at[..6])).sum()
+            rule.points.iter().map(|(shape, weight)| weight * shape.determinant(&at)).sum()
         };
         (0..mesh.cell_count()).map(of_cell).sum()
     }

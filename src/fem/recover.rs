@@ -1,44 +1,31 @@
 //! Stress at the nodes by superconvergent patch recovery.
 //!
-//! Around each corner node a polynomial (of the degree of the displacement) is fitted by least squares to
+//! Around each corner node a quadratic polynomial is fitted by least squares to
 //! the stress at the most accurate points of the surrounding cells; its value at a node is the recovered
 //! stress, averaged where several patches reach a node. Source: O. C. Zienkiewicz and J. Z. Zhu, Int. J.
 //! Numer. Meth. Engng 33 (1992) 1331-1364. Patches at the boundary, too small for the fit, are grown by
 //! the next ring of cells.
 
-use super::element::Rule;
+use super::element::{CORNERS, Rule};
 use super::material::Stress;
 use super::mesh::Mesh;
 use super::solution::Solution;
 use crate::geometry::lists::distinct;
 
 /// Terms of the quadratic polynomial 1, x, y, x2, xy, y2; the linear one uses the first three.
-const MAX_TERMS: usize = 6;
+const TERMS: usize = 6;
 
 /// A stress sample and where it was taken.
 type Sample = ([f64; 2], [f64; 4]);
 
 impl Solution {
-    /// Stress at each node by superconvergent patch recovery, shape \[nodes\]; one order more accurate inside
-    /// than the stress of a single cell. It is continuous within a material: near a singular corner it spreads the peak. Where
-    /// materials meet it is that of the side where von Mises stress is larger.
-    pub fn stress_at_points(&self) -> Vec<Stress> {
-        let (parted, at) = self.parted();
-        let mut stress: Vec<Stress> = parted.recovered_stress();
-        let copies = stress.split_off(self.mesh().node_count());
-        for (side, &node) in copies.into_iter().zip(&at[stress.len()..]) {
-            let known = &mut stress[node as usize];
-            *known = if side.von_mises() > known.von_mises() { side } else { *known };
-        }
-        stress
-    }
-
-    /// The same of a mesh whose cells share nodes with cells of their own material alone.
+    /// Stress at each node of a mesh whose cells share nodes with cells of their own material alone, shape \[nodes\]; one order more
+    /// accurate inside than the stress of a single cell. Near a singular corner it spreads the peak.
     pub(super) fn recovered_stress(&self) -> Vec<Stress> {
-        self.recovered_from(&self.mesh().kind().stress_rule())
+        self.recovered_from(&Rule::of_stress())
     }
 
-    /// The same from other points of the cells.
+    /// The same from the stress at other points of the cells.
     pub(super) fn recovered_from(&self, rule: &Rule) -> Vec<Stress> {
         let mesh = self.mesh();
         let samples = self.samples(rule);
@@ -65,7 +52,7 @@ impl Solution {
         let mesh = self.mesh();
         let of_cell = |cell: usize| {
             let at = mesh.positions(cell);
-            let points = rule.points.iter().map(|(s, _)| s.interpolate(&at[..mesh.kind().nodes()]));
+            let points = rule.points.iter().map(|(s, _)| s.interpolate(&at));
             points.zip(self.stress_in(cell, rule).map(|s| [s.xx, s.yy, s.xy, s.zz])).collect()
         };
         (0..mesh.cell_count()).map(of_cell).collect()
@@ -75,7 +62,7 @@ impl Solution {
 fn corner_nodes(mesh: &Mesh) -> Vec<bool> {
     let mut corner = vec![false; mesh.node_count()];
     for cell in 0..mesh.cell_count() {
-        for &node in &mesh.cell(cell)[..mesh.kind().corners()] {
+        for &node in &mesh.cell(cell)[..CORNERS] {
             corner[node as usize] = true;
         }
     }
@@ -92,11 +79,11 @@ fn reached(mesh: &Mesh, vertex: usize, cells: &[u32], corners: &[bool]) -> Vec<u
 struct Fit {
     origin: [f64; 2],
     size: f64,
-    coefficients: [[f64; MAX_TERMS]; 4],
+    coefficients: [[f64; TERMS]; 4],
 }
 
 impl Fit {
-    fn terms(&self, p: [f64; 2]) -> [f64; MAX_TERMS] {
+    fn terms(&self, p: [f64; 2]) -> [f64; TERMS] {
         let (x, y) = ((p[0] - self.origin[0]) / self.size, (p[1] - self.origin[1]) / self.size);
         [1.0, x, y, x * x, x * y, y * y]
     }
@@ -115,21 +102,20 @@ fn fit_patch<'a>(
     around: impl Fn(usize) -> &'a [u32],
     samples: &[Vec<Sample>],
 ) -> Fit {
-    let wanted = if mesh.kind().degree() == 1 { 3 } else { 6 };
     let origin = [mesh.x()[vertex], mesh.y()[vertex]];
     let mut patch = around(vertex).to_vec();
     loop {
         let points: Vec<&Sample> = patch.iter().flat_map(|&c| &samples[c as usize]).collect();
-        if points.len() > wanted
-            && let Some(fit) = least_squares(origin, &points, wanted)
+        if points.len() > TERMS
+            && let Some(fit) = least_squares(origin, &points, TERMS)
         {
             return fit;
         }
         let nodes = patch.iter().flat_map(|&c| mesh.cell(c as usize));
         let grown = distinct(nodes.flat_map(|&n| around(n as usize)).copied());
         if grown.len() == patch.len() {
-            let fits = [6, 3, 1].into_iter().filter(|&t| t <= wanted);
-            return fits
+            return [TERMS, 3, 1]
+                .into_iter()
                 .filter_map(|terms| least_squares(origin, &points, terms))
                 .next()
                 .expect("the mean of at least one sample exists");
@@ -141,8 +127,8 @@ fn fit_patch<'a>(
 /// Normal equations in scaled coordinates; `None` if the points do not determine the polynomial.
 fn least_squares(origin: [f64; 2], points: &[&Sample], terms: usize) -> Option<Fit> {
     let reach = points.iter().map(|(p, _)| (p[0] - origin[0]).hypot(p[1] - origin[1])).fold(0.0, f64::max);
-    let mut fit = Fit { origin, size: reach, coefficients: [[0.0; MAX_TERMS]; 4] };
-    let (mut matrix, mut sides) = ([[0.0; MAX_TERMS]; MAX_TERMS], [[0.0; MAX_TERMS]; 4]);
+    let mut fit = Fit { origin, size: reach, coefficients: [[0.0; TERMS]; 4] };
+    let (mut matrix, mut sides) = ([[0.0; TERMS]; TERMS], [[0.0; TERMS]; 4]);
     for (p, stress) in points {
         let row = fit.terms(*p);
         for i in 0..terms {
@@ -161,7 +147,7 @@ fn least_squares(origin: [f64; 2], points: &[&Sample], terms: usize) -> Option<F
 
 /// Overwrites the lower triangle of the leading n x n block with its Cholesky factor; `None` if a pivot
 /// falls below 1e-8 of its diagonal entry.
-fn cholesky(m: &mut [[f64; MAX_TERMS]; MAX_TERMS], n: usize) -> Option<()> {
+fn cholesky(m: &mut [[f64; TERMS]; TERMS], n: usize) -> Option<()> {
     for j in 0..n {
         let pivot = m[j][j] - (0..j).map(|k| m[j][k] * m[j][k]).sum::<f64>();
         if pivot <= 1e-8 * m[j][j] {
@@ -176,7 +162,7 @@ fn cholesky(m: &mut [[f64; MAX_TERMS]; MAX_TERMS], n: usize) -> Option<()> {
 }
 
 /// Solves L L' x = b.
-fn substitute(l: &[[f64; MAX_TERMS]; MAX_TERMS], n: usize, mut x: [f64; MAX_TERMS]) -> [f64; MAX_TERMS] {
+fn substitute(l: &[[f64; TERMS]; TERMS], n: usize, mut x: [f64; TERMS]) -> [f64; TERMS] {
     for i in 0..n {
         x[i] = (x[i] - (0..i).map(|k| l[i][k] * x[k]).sum::<f64>()) / l[i][i];
     }

@@ -2,13 +2,13 @@
 
 use std::f64::consts::TAU;
 
+use super::Mesh;
 use super::curves::MERGED;
 use super::error::FemError;
 use super::material::{Inclusions, Material};
 use super::outline_mesh::OutlineMesh;
-use super::problem::{Fixed, PointForce, Problem, Traction};
+use super::problem::{Problem, Traction};
 use super::strain::Strain;
-use super::{Axis, Mesh};
 use crate::geometry::outline::{Outline, Place};
 use crate::geometry::piece::Piece;
 use crate::geometry::point::{Point, distance};
@@ -244,11 +244,9 @@ impl<'a> ShapeProblem<'a> {
         }
         for (node, holders) in holder.iter().enumerate() {
             let at = [mesh.mesh().x()[node], mesh.mesh().y()[node]];
-            for (axis, number) in [Axis::X, Axis::Y].into_iter().zip(holders) {
-                if let Some(number) = number {
-                    let value = (self.supports[*number].displacement)(at)[axis as usize];
-                    problem.fixed.push(Fixed { node: node as u32, axis, value });
-                }
+            for (axis, number) in holders.iter().enumerate() {
+                let value = number.map(|number| (self.supports[number].displacement)(at)[axis]);
+                problem.prescribed[2 * node + axis] = value;
             }
         }
         for traction in &self.tractions {
@@ -262,7 +260,7 @@ impl<'a> ShapeProblem<'a> {
             let at = self.on_body(index, at)?;
             let node =
                 self.node_at(mesh.mesh(), at).ok_or(FemError::OutsideMesh { index, x: at[0], y: at[1] })?;
-            problem.forces.push(PointForce { node: node as u32, force });
+            problem.forces.push((node, force));
         }
         (problem.body_force, problem.strain) = (self.body_force, self.strain);
         Ok((problem, holder))

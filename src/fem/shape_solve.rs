@@ -7,6 +7,7 @@
 
 use std::collections::BTreeMap;
 
+use super::element::{Rule, Shape, side_nodes};
 use super::error::FemError;
 use super::locate::invert;
 use super::material::Stress;
@@ -147,7 +148,7 @@ fn carried(coarse: &Solution, mesh: &Mesh) -> Vec<f64> {
         let before = coarse.of_cell(cell / 4);
         for (&node, p) in mesh.cell(cell).iter().zip(mesh.positions(cell)) {
             if let Some(place) = invert(coarse.mesh(), cell / 4, p) {
-                let at = mesh.kind().shape(place).interpolate(&before[..mesh.kind().nodes()]);
+                let at = Shape::at(place).interpolate(&before);
                 u[2 * node as usize..][..2].copy_from_slice(&at);
             }
         }
@@ -157,17 +158,17 @@ fn carried(coarse: &Solution, mesh: &Mesh) -> Vec<f64> {
 
 /// Relative L2 distance of two levels.
 fn change(coarse: &Solution, fine: &Solution) -> f64 {
-    let (mesh, rule) = (fine.mesh(), fine.mesh().kind().stress_rule());
+    let (mesh, rule) = (fine.mesh(), Rule::of_stress());
     let (mut off, mut size) = (0.0, 0.0);
     for cell in 0..mesh.cell_count() {
         let (at, u) = (mesh.positions(cell), fine.of_cell(cell));
         let parent = cell / 4;
         let before = coarse.of_cell(parent);
         for (shape, weight) in &rule.points {
-            let area = weight * shape.determinant(&at[..6]);
-            let (p, u) = (shape.interpolate(&at[..6]), shape.interpolate(&u[..6]));
+            let area = weight * shape.determinant(&at);
+            let (p, u) = (shape.interpolate(&at), shape.interpolate(&u));
             let Some(place) = invert(coarse.mesh(), parent, p) else { continue };
-            let v = coarse.mesh().kind().shape(place).interpolate(&before[..6]);
+            let v = Shape::at(place).interpolate(&before);
             off += area * ((u[0] - v[0]).powi(2) + (u[1] - v[1]).powi(2));
             size += area * (u[0] * u[0] + u[1] * u[1]);
         }
@@ -205,7 +206,7 @@ fn richardson(distances: &[f64], highest: f64) -> (f64, f64) {
 
 fn reactions(
     supports: usize,
-    problem: &super::Problem,
+    problem: &super::problem::Problem,
     holder: &[[Option<usize>; 2]],
     solution: &Solution,
 ) -> Vec<Reaction> {
@@ -269,12 +270,11 @@ impl ShapeSolution {
     /// # Errors
     /// As [`ShapeSolution::displacements_at`].
     pub(crate) fn displacements_within(&self, points: &[Point], reach: f64) -> Result<Vec<Point>, FemError> {
-        let (x, y): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p[0], p[1])).unzip();
-        self.solution.displacements_within(&x, &y, reach)
+        self.solution.displacements_within(points, reach)
     }
 
     /// Stress [N/m2] at points \[m\] of the undeformed body, shape \[points\]: inside recovered from the cells around
-    /// ([`Solution::stress_at_points`]), on the boundary, where that has cells on one side only and is less accurate
+    /// (O. C. Zienkiewicz and J. Z. Zhu, 1992), on the boundary, where that has cells on one side only and is less accurate
     /// than the cells themselves, the mean of the cells that have a side there. Where materials meet, it is that of the
     /// side where von Mises stress is larger.
     ///
@@ -289,9 +289,8 @@ impl ShapeSolution {
     /// # Errors
     /// As [`ShapeSolution::displacements_at`].
     pub(crate) fn stress_within(&self, points: &[Point], reach: f64) -> Result<Vec<Stress>, FemError> {
-        let (x, y): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p[0], p[1])).unzip();
-        let (parted, _) = self.solution.parted();
-        parted.interpolated_within(&nodal_stress(&parted), [&x, &y], [self.reach, reach])
+        let parted = self.solution.parted();
+        parted.interpolated_within(&nodal_stress(&parted), points, [self.reach, reach])
     }
 }
 
@@ -300,10 +299,10 @@ impl ShapeSolution {
 /// around: a cell that can hardly change its volume has the right pressure in its middle alone.
 fn nodal_stress(parted: &Solution) -> Vec<Stress> {
     let (mesh, mut stress) = (parted.mesh(), parted.recovered_stress());
-    let of_middles = parted.recovered_from(&mesh.kind().centre_rule());
+    let of_middles = parted.recovered_from(&Rule::of_centre());
     let mut sums: BTreeMap<u32, (Stress, f64)> = BTreeMap::new();
     for side in mesh.boundary() {
-        for local in mesh.kind().side_nodes(side.side as usize) {
+        for local in side_nodes(side.side as usize) {
             let node = mesh.cell(side.cell as usize)[local];
             let own = parted.stress_at_node(side.cell as usize, local);
             let (sum, count) = sums.entry(node).or_default();
