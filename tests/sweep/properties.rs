@@ -326,7 +326,7 @@ proptest! {
             };
             let rule = Rule { mean: Mean::Material { rotation: Rotation::Corotated }, ..Rule::BARYCENTRE };
             let load = Some(Load { force, compliance: [[0.0; 2]; 2] });
-            let cells = elements.iter().zip(&slots).map(|(element, slots)| CellAround { element, factor: 1.5, own: 0, slots });
+            let cells = elements.iter().zip(&slots).map(|(element, slots)| CellAround { element, own: 0, slots });
             let patches = std::iter::empty::<(f64, std::iter::Empty<PatchCell>)>();
             let own = ParticleState { present, reference: [0.0; 2], rest: [0.0; 2], load };
             rule.target_by_cells(&own, pull(cells, patches, corner), [false; 2])
