@@ -239,6 +239,13 @@ impl LatticeArguments {
                 }
             }
         };
+        if kind.is_out_of_proportion() {
+            return Err(wrong(
+                "--b",
+                "it makes one edge more than a million times as long as the other",
+                "give edges that differ by a factor of at most a million",
+            ));
+        }
         let orientation = self.orientation.unwrap_or(0.0);
         if !orientation.is_finite() {
             return Err(wrong("--orientation", format!("{orientation} is no angle"), "give degrees"));

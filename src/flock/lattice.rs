@@ -289,17 +289,25 @@ impl Lattice {
                 std::mem::swap(&mut p, &mut q);
             }
             let (u, v) = (self.vector(p), self.vector(q));
-            let times = ((u[0] * v[0] + u[1] * v[1]) / (u[0] * u[0] + u[1] * u[1])).round() as i32;
-            if times == 0 {
+            let times = ((u[0] * v[0] + u[1] * v[1]) / (u[0] * u[0] + u[1] * u[1])).round();
+            let less = [0, 1].map(|k| f64::from(q[k]) - times * f64::from(p[k]));
+            // Of a cell so flat that its columns cannot be counted none is nearest.
+            if times == 0.0 || !less.iter().all(|columns| columns.abs() <= MOST_COLUMNS) {
                 break;
             }
-            q = [q[0] - times * p[0], q[1] - times * p[1]];
+            q = less.map(|columns| columns as i32);
         }
         let (sum, difference) = ([p[0] + q[0], p[1] + q[1]], [p[0] - q[0], p[1] - q[1]]);
         let third = if norm(self.vector(sum)) < norm(self.vector(difference)) { sum } else { difference };
         [p, q, third].into_iter().flat_map(|s| [s, [-s[0], -s[1]]]).collect()
     }
 }
+
+/// An edge of an oblique cell is at most so many times as long as the other.
+const MOST_OBLIQUE: f64 = 1e6;
+
+/// Columns, or rows, that a neighbour may be away: sums of some of them fit in a [`Site`].
+const MOST_COLUMNS: f64 = (1 << 26) as f64;
 
 /// All nonzero integer combinations of the primitive offsets with coefficients up to `radius`:
 /// the Chebyshev ring (8 for radius 1, 24 for radius 2).
@@ -344,6 +352,11 @@ fn rounded_angle(angle: f64, period: f64) -> i64 {
 }
 
 impl LatticeKind {
+    /// Whether one edge of its cell is so many times as long as the other that columns of one cannot be counted along the other.
+    pub fn is_out_of_proportion(&self) -> bool {
+        matches!(self, Self::Oblique { a, b, .. } if a.max(*b) > MOST_OBLIQUE * a.min(*b))
+    }
+
     /// One lattice of each kind, of about unit size, to try on all of them what must hold on each.
     pub const SAMPLES: [LatticeKind; 6] = [
         LatticeKind::Square { spacing: 1.0 },

@@ -254,6 +254,9 @@ fn options_that_make_no_question_are_refused_with_the_remedy() {
     refused(&["--lattice", "square", "--spacing", "-1"], &["--spacing", "positive"]);
     refused(&["--lattice", "rectangular", "--a", "2"], &["--b", "needs"]);
     refused(&["--lattice", "oblique", "--a", "1", "--b", "1", "--angle", "180"], &["--angle", "180"]);
+    for b in ["3e9", "1e-9"] {
+        refused(&["--lattice", "oblique", "--a", "1", "--b", b, "--angle", "40"], &["--b", "million times"]);
+    }
 }
 
 #[test]

@@ -208,6 +208,10 @@ fn body(
         let help = "add `lattice = { kind = \"square\", spacing = 1.0 }`, or give the body as points";
         return Err(refuse("lattice", "is missing".into(), help));
     };
+    if lattice.kind().is_out_of_proportion() {
+        let message = "one edge of the cell is more than a million times as long as the other".into();
+        return Err(refuse("lattice", message, "give edges `a` and `b` of a like length"));
+    }
     Ok((BodySource::Cut(cut(&raw.body, shape)), lattice))
 }
 
