@@ -207,7 +207,9 @@ impl<'a> Checkpointer<'a> {
     /// The next step at which one is due for its number.
     pub fn next(&self, step: usize) -> usize {
         let due = self.every.iter().filter_map(|interval| match interval {
-            Interval::Steps(steps) if self.scene.equilibrium.is_none() => Some(self.last_step + steps),
+            Interval::Steps(steps) if self.scene.equilibrium.is_none() => {
+                Some(self.last_step.saturating_add(*steps))
+            }
             _ => None,
         });
         due.filter(|due| *due > step).min().unwrap_or(usize::MAX)
@@ -218,7 +220,7 @@ impl<'a> Checkpointer<'a> {
         self.scene.equilibrium.is_none()
             && self.every.iter().any(|interval| match interval {
                 Interval::Time(time) => self.last.elapsed() >= *time,
-                Interval::Steps(steps) => step >= self.last_step + steps,
+                Interval::Steps(steps) => step >= self.last_step.saturating_add(*steps),
                 Interval::Never => false,
             })
     }

@@ -121,14 +121,12 @@ fn wrapped(text: &str, size: f64, room: f64) -> Vec<String> {
     let fits = |line: &str| text_width(line, size) <= room;
     for mut word in text.split_whitespace() {
         // A word longer than a line, as those of scripts without spaces are.
-        while !fits(word) {
-            let ends = word.char_indices().map(|(at, _)| at).skip(1);
-            let end = ends
-                .take_while(|&end| fits(&word[..end]))
-                .last()
-                .unwrap_or_else(|| word.ceil_char_boundary(1));
-            lines.push(word[..end].to_owned());
-            word = &word[end..];
+        while !fits(word) && word.chars().nth(1).is_some() {
+            let ends = || word.char_indices().map(|(at, _)| at).skip(1);
+            let end = ends().take_while(|&end| fits(&word[..end])).last().or_else(|| ends().next());
+            let (line, rest) = word.split_at(end.unwrap_or(word.len()));
+            lines.push(line.to_owned());
+            word = rest;
         }
         match lines.last_mut() {
             Some(line) if fits(&format!("{line} {word}")) => {
