@@ -157,10 +157,9 @@ mount -t tmpfs -o size=400k tmpfs "$disk" && cd "$disk" && head -c 390k /dev/zer
 run=$!
 until_it() { for _ in $(seq 300); do "$@" && return; sleep 0.1; done; echo "never: $*"; kill $run; exit; }
 until_it grep -q "no checkpoint at step" "$said"
-for _ in $(seq 100); do ls -A .o.partial | wc -l; sleep 0.01; done | sort -n | tail -n 1
-rm filler
-until_it test -e o.unfinished/checkpoint
+for _ in $(seq 40); do ls -A .o.partial | wc -l; sleep 0.01; done | sort -n | tail -n 1
 mount -o remount,size=64m "$disk"
+until_it test -e o.unfinished/checkpoint
 kill -INT $run
 wait $run
 ls o
