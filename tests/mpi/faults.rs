@@ -141,7 +141,7 @@ fn an_interrupt_of_one_rank_ends_all_at_one_step_from_which_the_run_goes_on() {
     let expected = alone(&LONG);
     let folder = temporary();
     let (mut run, ranks) = begun(3, &LONG, 1, folder.path());
-    // It is not told by the launcher, which would kill what takes longer than it likes.
+    // Not by the launcher, which would kill what takes longer than it likes.
     signal("TERM", ranks[1]);
     signal("CONT", ranks[1]);
     let (is_well, said) = ended(&mut run);

@@ -182,10 +182,11 @@ impl FlightReport {
             false => 0.0,
         };
         let to_come = finite(waited + formation.programs_end()).filter(|_| formation.is_led_here());
-        let faulty = (0..formation.count()).filter(|&m| flight.fleet().had_fault(m));
-        let faulty: Vec<String> = faulty.map(|m| formation.names[m].clone()).collect();
-        let never_heard = (0..formation.count()).filter(|&m| flight.control().position(m).is_none());
-        let never_heard: Vec<String> = never_heard.map(|m| formation.names[m].clone()).collect();
+        let names = |is: &dyn Fn(usize) -> bool| -> Vec<String> {
+            (0..formation.count()).filter(|&m| is(m)).map(|m| formation.names[m].clone()).collect()
+        };
+        let faulty = names(&|m| flight.fleet().had_fault(m));
+        let never_heard = names(&|m| flight.control().position(m).is_none());
         let mut report = Self {
             name: swarm.name.clone(),
             title: swarm.raw.title.clone(),
