@@ -242,8 +242,8 @@ impl LatticeArguments {
         if kind.is_out_of_proportion() {
             return Err(wrong(
                 "--b",
-                "it makes one edge more than a million times as long as the other",
-                "give edges that differ by a factor of at most a million",
+                "it makes an edge of the cell more than a million times as long as the cell is high above it",
+                "give edges of a like length, and an --angle farther from 0 and 180 degrees",
             ));
         }
         let orientation = self.orientation.unwrap_or(0.0);

@@ -3,7 +3,7 @@
 use super::layout::Layout;
 use super::parts::agreed;
 use super::pieces::{linkage, require_held};
-use super::plan::{held_axes, refuse_loose, update};
+use super::plan::{held_axes, is_led_to_rest, refuse_loose, update};
 use super::weights;
 use crate::engine::setup::RoleChange;
 use crate::flock::action::ActionKind;
@@ -62,7 +62,7 @@ impl Among<'_> {
         let (Some(cells), Mean::Material { .. }) = (cells, scene.mean) else { return Ok(()) };
         let incidence = cells.incidence(body.count());
         let (part, linkage) = linkage(body, (cells, &incidence), team);
-        if has_loads {
+        if has_loads || is_led_to_rest(scene) {
             let held = require_held(body, &incidence, (&part, &linkage), &held_axes(body, changes), team);
             held.map_err(|mechanism| refuse_loose(scene, &mechanism))?;
         }

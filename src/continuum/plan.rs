@@ -388,15 +388,23 @@ pub(super) fn held_axes(body: &Body, changes: &[RoleChange]) -> Vec<[bool; 2]> {
     of_first_roles(changes, body.count(), |_, change| change.role.is_led())
 }
 
-/// A load on a follower needs a rule with a stiffness, and a body that cannot get away.
+/// Whether leaders move a body to an equilibrium: where it may slide or turn, solvers find it anywhere on that way.
+pub(super) fn is_led_to_rest(scene: &Scene) -> bool {
+    scene.equilibrium.is_some() && scene.roles.iter().any(|entry| entry.motion.is_some())
+}
+
+/// A load on a follower needs a rule with a stiffness, and a body that cannot get away; so does an equilibrium by leaders.
 fn require_carried(
     scene: &Scene,
     layout: &Layout,
     leads: &[[bool; 2]],
     forces: Option<&Vectors>,
 ) -> Result<(), SceneError> {
-    let (Some(cells), Some(forces)) = (&layout.cells, forces) else { return Ok(()) };
+    let Some(cells) = layout.cells.as_ref().filter(|_| forces.is_some() || is_led_to_rest(scene)) else {
+        return Ok(());
+    };
     if !matches!(scene.mean, Mean::Material { .. }) {
+        let Some(forces) = forces else { return Ok(()) };
         let Some(i) = layout.body.owned().find(|&i| leads[i] != [true; 2] && forces.get(i) != [0.0; 2])
         else {
             return Ok(());

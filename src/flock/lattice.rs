@@ -303,7 +303,7 @@ impl Lattice {
     }
 }
 
-/// An edge of an oblique cell is at most so many times as long as the other.
+/// An edge of an oblique cell is at most so many times as long as the cell is high above it.
 const MOST_OBLIQUE: f64 = 1e6;
 
 /// Columns, or rows, that a neighbour may be away: sums of some of them fit in a [`Site`].
@@ -352,9 +352,10 @@ fn rounded_angle(angle: f64, period: f64) -> i64 {
 }
 
 impl LatticeKind {
-    /// Whether one edge of its cell is so many times as long as the other that columns of one cannot be counted along the other.
+    /// Whether an edge of its cell is so many times as long as the cell is high above it that columns of one cannot be counted
+    /// along the other.
     pub fn is_out_of_proportion(&self) -> bool {
-        matches!(self, Self::Oblique { a, b, .. } if a.max(*b) > MOST_OBLIQUE * a.min(*b))
+        matches!(self, Self::Oblique { a, b, angle } if a.max(*b) > MOST_OBLIQUE * (a.min(*b) * angle.sin()))
     }
 
     /// One lattice of each kind, of about unit size, to try on all of them what must hold on each.

@@ -254,8 +254,8 @@ fn options_that_make_no_question_are_refused_with_the_remedy() {
     refused(&["--lattice", "square", "--spacing", "-1"], &["--spacing", "positive"]);
     refused(&["--lattice", "rectangular", "--a", "2"], &["--b", "needs"]);
     refused(&["--lattice", "oblique", "--a", "1", "--b", "1", "--angle", "180"], &["--angle", "180"]);
-    for b in ["3e9", "1e-9"] {
-        refused(&["--lattice", "oblique", "--a", "1", "--b", b, "--angle", "40"], &["--b", "million times"]);
+    for (b, angle) in [("3e9", "40"), ("1e-9", "40"), ("1", "1e-5"), ("1", "179.99999")] {
+        refused(&["--lattice", "oblique", "--a", "1", "--b", b, "--angle", angle], &["--b", "million times"]);
     }
 }
 

@@ -266,6 +266,7 @@ fn values_out_of_range_are_refused_with_the_range() {
     refused_with("tension", &["update.damping=0"], &["greater than 0"]);
     refused_with("tension", &["update.damping=2.5"], &["2"]);
     refused_with("lattice-oblique", &["lattice.angle=180"], &["less than 180"]);
+    refused_with("lattice-oblique", &["lattice.angle=1e-5"], &["million times"]);
     refused_with("tension", &["body.shape.columns=0"], &["body.shape.columns", "1"]);
     refused_with("fracture", &["fracture.distance=0"], &["greater than 0"]);
     refused_with("tension", &["stop.steps=0"], &["stop.steps"]);

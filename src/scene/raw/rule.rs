@@ -237,7 +237,7 @@ pub struct RawUpdate {
     /// The order of updates within one step; all at once unless given.
     pub order: RawOrder,
     /// Part of the way to the target that is gone in one step [1]. Unless given, 1; for the rule
-    /// `material` swept synchronously, nine tenths of the most at which no wave grows.
+    /// `material` and weights of kind `gradient` swept synchronously, nine tenths of the most at which no wave grows.
     #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 2))]
     pub damping: Option<f64>,
 }

@@ -12,7 +12,8 @@ use crate::geometry::point::area;
 use crate::scene::document::Document;
 use crate::scene::document::problem::SceneError;
 use crate::scene::raw::{
-    RawBody, RawFrame, RawLattice, RawMean, RawRecord, RawScene, RawShape, RawStop, RawUpdate, RawWeights,
+    RawBody, RawFrame, RawLattice, RawMean, RawRecord, RawRest, RawScene, RawShape, RawStop, RawUpdate,
+    RawWeights,
 };
 use crate::scene::validate::{self as scene_checks, File, Refuse};
 use crate::scene::{Scene, bundled};
@@ -156,6 +157,7 @@ fn bridged(
 ) -> Result<Shape, SceneError> {
     let own = [
         ("rule", raw.rule.mean.is_some() || raw.rule.weights.is_some() || raw.rule.feedback.is_some()),
+        ("rule", raw.rule.rest != RawRest::default() || raw.rule.poisson.is_some()),
         ("frame", raw.frame != RawFrame::None),
         ("neighbours", raw.neighbours.is_some()),
         ("links", raw.links.is_some()),

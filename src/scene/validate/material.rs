@@ -5,6 +5,7 @@ use crate::flock::lattice::Lattice;
 use crate::flock::neighbourhood::Neighbourhood;
 use crate::material::cells;
 use crate::material::elastic::{Constants, Elastic, ElasticError, Plane};
+use crate::material::gradient::SAFE_DAMPING;
 use crate::material::homogenise::Crystal;
 use crate::material::outline_loads::{Profile, Push};
 use crate::scene::document::problem::SceneError;
@@ -111,13 +112,16 @@ pub fn is_material(raw: &RawScene) -> bool {
     matches!(raw.rule.mean, Some(RawMean::Material { .. }))
 }
 
-/// The damping as written; unless it is, 1, or what keeps every wave of a material from growing.
+/// The damping as written; unless it is, 1, or what keeps every wave of a material or a second gradient from growing.
 pub fn damping(raw: &RawScene, lattice: &Lattice, body: Option<&Elastic>, inclusions: &[Inclusion]) -> f64 {
     let synchronous = raw.update.order == RawOrder::Synchronous;
     let limit = |elastic: &Elastic| {
         Crystal::material(lattice, elastic).ok()?.zone().ok().map(|zone| zone.damping_limit)
     };
     let of_waves = || {
+        if synchronous && matches!(raw.rule.weights, Some(RawWeights::Gradient { .. })) {
+            return OF_DAMPING_LIMIT * SAFE_DAMPING;
+        }
         let body = body.filter(|_| is_material(raw) && synchronous);
         let all = body.into_iter().flat_map(|body| {
             std::iter::once(body).chain(inclusions.iter().map(|part| &part.material)).filter_map(limit)

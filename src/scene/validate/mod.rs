@@ -209,8 +209,13 @@ fn body(
         return Err(refuse("lattice", "is missing".into(), help));
     };
     if lattice.kind().is_out_of_proportion() {
-        let message = "one edge of the cell is more than a million times as long as the other".into();
-        return Err(refuse("lattice", message, "give edges `a` and `b` of a like length"));
+        let message =
+            "an edge of the cell is more than a million times as long as the cell is high above it".into();
+        return Err(refuse(
+            "lattice",
+            message,
+            "give edges `a` and `b` of a like length, and an angle farther from 0 and 180 degrees",
+        ));
     }
     Ok((BodySource::Cut(cut(&raw.body, shape)), lattice))
 }

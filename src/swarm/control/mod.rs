@@ -492,8 +492,8 @@ impl Control {
             let known = self.watch.place(member);
             self.known[member] = known.is_some();
             self.usable[member] = self.watch.health(member).is_usable();
-            // Where a lost member has gone is unknown: an age beyond the limit carries no more information.
-            let oldest = self.watch.limits().age_limit;
+            // Where a lost member has gone is unknown: an age beyond that of its last target carries no more information.
+            let oldest = self.watch.limits().age_limit + self.period;
             let (place, age) = match (known, self.starts[member]) {
                 (Some(place), _) => {
                     (place, self.watch.age(member, now).map_or(oldest, |age| age.min(oldest)))
@@ -521,8 +521,7 @@ impl Control {
             let follows = self.serves[member] && track.is_of(self.present.get(member));
             if !self.brakes {
                 stray.places.clear();
-                // One that is lost, or found to lie, need not do what it was sent to.
-                if follows && self.usable[member] {
+                if follows {
                     track.between(&mut stray.places);
                 }
                 continue;

@@ -210,8 +210,10 @@ impl Filter {
             } else {
                 are_between() && go_on && border().add_between(member < other, &mut self.cell.planes)
             };
-            if !is_added {
-                add_border(&mut self.cell.planes, [here, there, aside], standing, keep, stray, reach);
+            // A lost one need not do what it was sent to: then it is anywhere by its age, to which nothing more comes near.
+            if !is_added || (!brakes && stray > 0.0 && !seen.known[other]) {
+                let parts = (keep, !is_added);
+                add_border(&mut self.cell.planes, [here, there, aside], standing, parts, stray, reach);
             }
         }
         let obstacles = self.cell.planes.len();
@@ -327,7 +329,11 @@ impl Filter {
         flags: &mut Flags,
     ) {
         let most = self.limits.acceleration;
-        let step = |room: f64| period * most * ((period * period + 2.0 * room / most).sqrt() - period);
+        // Not as the difference of two times, which rounding takes all digits of where the limit is large.
+        let step = |room: f64| {
+            let time = (period * period + 2.0 * room / most).sqrt();
+            (2.0 * room * period / (time + period)).min(room)
+        };
         let end = self.cell.nearest(request.way, request.reach);
         let brakable = length(from) + step(length([end[0] - from[0], end[1] - from[1]]));
         for plane in self.cell.planes.iter_mut().filter(|plane| plane.offset > 0.0) {
@@ -395,13 +401,14 @@ impl MotionRequest {
 
 /// Appends the half-planes that keep a member `here` on its own side of another, if they can matter
 /// within `reach` \[m\]: the module's docs prove it. `aside` is the direction to it where both stand at
-/// the very same place; `standing` is where the member stands if it goes nowhere.
+/// the very same place; `standing` is where the member stands if it goes nowhere. Both `keep` a distance \[m\], and where they are
+/// perhaps nearer go away from each other, or only come no nearer.
 #[inline]
 fn add_border(
     planes: &mut Vec<HalfPlane>,
     [here, there, aside]: [[f64; 2]; 3],
     standing: [f64; 2],
-    keep: f64,
+    (keep, go_away): (f64, bool),
     stray: f64,
     reach: f64,
 ) {
@@ -430,7 +437,7 @@ fn add_border(
     let way = minus(there, standing);
     let distance = length(way);
     let normal = if distance > 0.0 { way.map(|x| x / distance) } else { aside };
-    let away = ((distance - keep) / 2.0).min(0.0);
+    let away = if go_away { ((distance - keep) / 2.0).min(0.0) } else { 0.0 };
     let mut push = |normal: [f64; 2], offset: f64| {
         planes.push(HalfPlane { normal, offset: offset + dot(normal, minus(standing, here)) });
     };

@@ -10,7 +10,7 @@ use crate::flock::motion::{Interpolation, Keyframe, Motion};
 use crate::flock::vectors::distance;
 use crate::geometry::point::minus;
 use crate::scene::swarm::raw::{RawCommandKind, RawSwarm};
-use crate::scene::swarm::{Program, Swarm};
+use crate::scene::swarm::{Leaders, Picked, Program, Swarm};
 use crate::scene::text::{decimals, number};
 use crate::swarm::flight::Flight;
 use crate::swarm::formation::{Formation, first_few};
@@ -44,7 +44,9 @@ pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
         in_solids(flight),
         led_into_solids(flight),
     ];
-    let fast = fast_manoeuvres(raw, formation).chain(fast_paths(swarm)).chain(leaping_paths(swarm));
+    let fast = fast_manoeuvres(raw, formation)
+        .chain(fast_paths(swarm, formation))
+        .chain(leaping_paths(swarm, formation));
     let commanded = commanded_astray(raw, flight);
     network::of(raw, flight)
         .into_iter()
@@ -236,10 +238,10 @@ fn fast_manoeuvres(raw: &RawSwarm, formation: &Formation) -> impl Iterator<Item 
     })
 }
 
-fn fast_paths(swarm: &Swarm) -> impl Iterator<Item = String> {
+fn fast_paths(swarm: &Swarm, formation: &Formation) -> impl Iterator<Item = String> {
     let limit = swarm.raw.limits.speed.unwrap_or(f64::INFINITY);
     swarm.leaders.iter().enumerate().filter_map(move |(k, leaders)| {
-        let fastest = motions(&leaders.program).map(speed).fold(0.0, f64::max);
+        let fastest = motions(leaders, formation).map(speed).fold(0.0, f64::max);
         (fastest > limit * (1.0 + ROUNDING)).then(|| {
             format!(
                 "the program of leaders[{k}] moves a robot at up to {} m/s, above limits.speed: it will fall \
@@ -251,10 +253,10 @@ fn fast_paths(swarm: &Swarm) -> impl Iterator<Item = String> {
 }
 
 /// Programs that leap from one point to the next.
-fn leaping_paths(swarm: &Swarm) -> impl Iterator<Item = String> {
+fn leaping_paths(swarm: &Swarm, formation: &Formation) -> impl Iterator<Item = String> {
     let reach = swarm.raw.limits.speed.unwrap_or(f64::INFINITY) * swarm.raw.control.period;
     swarm.leaders.iter().enumerate().filter_map(move |(k, leaders)| {
-        let farthest = motions(&leaders.program).map(leap).fold(0.0, f64::max);
+        let farthest = motions(leaders, formation).map(leap).fold(0.0, f64::max);
         (farthest > reach * (1.0 + ROUNDING)).then(|| {
             format!(
                 "the program of leaders[{k}] leaps by up to {} m, farther than limits.speed leads in a period: the robot \
@@ -265,14 +267,20 @@ fn leaping_paths(swarm: &Swarm) -> impl Iterator<Item = String> {
     })
 }
 
-/// Those of a program by points.
-fn motions(program: &Program) -> impl Iterator<Item = &Motion> {
-    let (one, several) = match program {
+/// Those of a program by points. One file may have rows for robots of other entries too.
+fn motions<'a>(leaders: &'a Leaders, formation: &Formation) -> impl Iterator<Item = &'a Motion> {
+    let is_led = |name: &String| match &leaders.robots {
+        Picked::Names(names) => names.contains(name),
+        Picked::Region(_) => {
+            formation.names.iter().position(|one| one == name).is_some_and(|m| formation.leads(m))
+        }
+    };
+    let (one, several) = match &leaders.program {
         Program::Motion(motion) => (Some(motion), &[][..]),
         Program::Individual(tracks) => (None, &tracks[..]),
         Program::External | Program::Manoeuvre(_) => (None, &[][..]),
     };
-    one.into_iter().chain(several.iter().map(|(_, motion)| motion))
+    one.into_iter().chain(several.iter().filter(move |(name, _)| is_led(name)).map(|(_, motion)| motion))
 }
 
 /// Largest leap of a program that holds each of its points until the next \[m\].
