@@ -541,6 +541,10 @@ fn a_material_in_parts_is_refused_for_what_it_is_refused_for_as_a_whole() {
     let at =
         |role: &str| format!("roles=[{{region={{kind=\"edge\",side=\"left\"}},role=\"clamped\"{role}}}]");
     let one = "roles=[{region={kind=\"ids\",ids=[100]},role=\"clamped\"}]";
+    let led_on_rollers = at(",axis=\"x\"").replace(
+        "}]",
+        "},{region={kind=\"edge\",side=\"right\"},role=\"leader\",axis=\"x\",motion={kind=\"velocity\",per_step=[0.6,0]}}]",
+    );
     let within = "roles=[{region={kind=\"box\",min=[0,0],max=[9,9]},role=\"clamped\"},\
         {region={kind=\"box\",min=[0,0],max=[8,8]},role=\"clamped\",axis=\"y\"}]";
     let paper = ["rule.mean.kind=\"barycentre\"", "neighbours={kind=\"second\"}"];
@@ -563,6 +567,7 @@ fn a_material_in_parts_is_refused_for_what_it_is_refused_for_as_a_whole() {
         ("no leader holds", &[&weight, "roles=[]"]),
         ("at one particle only", &[&weight, one]),
         ("can slide or turn", &[plain, &weight, &at(",axis=\"x\"")]),
+        ("can slide or turn", &[plain, &led_on_rollers, "equilibrium={}"]),
         ("no particle of the body lies", &[&nowhere]),
         ("no part of the outline lies", &[&off]),
         ("a rule without a stiffness", &[&paper[..], &[&weight]].concat()),

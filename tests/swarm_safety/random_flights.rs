@@ -207,6 +207,49 @@ fn no_flight_falls_below_the_declared_clearance() {
     }
 }
 
+/// Eight on a ring are led through its middle behind poses that vary in age, and are older than the limit now and then: one that is
+/// lost stands where it was sent, not where it was last seen.
+#[test]
+fn robots_that_are_lost_for_a_period_at_a_time_come_no_nearer() {
+    const COUNT: usize = 8;
+    for (seed, (period, delay, jitter)) in
+        (0..48).zip([(0.25, 1, 2), (0.1, 3, 4), (0.2, 0, 4)].into_iter().cycle())
+    {
+        let mut random = Pcg64Mcg::seed_from_u64(seed);
+        let mut draw = |low: f64, high: f64| random.random_range(low..high);
+        let mut text = String::from("title = \"late\"\nlinks = { kind = \"nearest\", count = 2 }\n");
+        for k in 0..COUNT {
+            let (y, x) = (std::f64::consts::TAU * k as f64 / COUNT as f64).sin_cos();
+            let place = [3.0 * x, 3.0 * y];
+            let (mut at, mut points) = (0.0, Vec::new());
+            for last in [false, false, true] {
+                at += draw(2.0, 5.0);
+                let goal = if last { place.map(|x| -x) } else { [draw(-3.0, 3.0), draw(-3.0, 3.0)] };
+                let by = [goal[0] - place[0], goal[1] - place[1]];
+                points.push(format!("{{ at = {at}, displacement = {by:?} }}"));
+            }
+            let _ = write!(
+                text,
+                "[[robots]]\nname = \"r{k}\"\nplace = {place:?}\nradius = {}\n[[leaders]]\nrobots = [\"r{k}\"]\n\
+                 program = {{ kind = \"path\", points = [{}] }}\n",
+                draw(0.1, 0.3),
+                points.join(", ")
+            );
+        }
+        let _ = write!(
+            text,
+            "[limits]\nspeed = 1.0\nclearance = 0.3\n[control]\nperiod = {period}\n[flight]\nduration = {}\n\
+             model = {SINGLE}\ndelay = {delay}\njitter = {jitter}\nseed = {seed}\n",
+            80.0 * period
+        );
+        let swarm =
+            Swarm::parse("late", "late.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+        let (_, report) = fly(&swarm, &mut |_, _| ControlFlow::Continue(())).expect("flies");
+        let clearance = report.clearance.expect("there are others");
+        assert!(clearance >= 0.3 - ROUNDING, "delay {delay}, jitter {jitter}, seed {seed}: {clearance}");
+    }
+}
+
 /// Two that are led through each other at full speed, whose braking is as long as their way is known badly.
 #[test]
 fn noise_does_not_bring_robots_that_brake_nearer_than_declared_bit_by_bit() {
@@ -227,6 +270,31 @@ fn noise_does_not_bring_robots_that_brake_nearer_than_declared_bit_by_bit() {
         let clearance = report.clearance.expect("two robots");
         assert!(clearance >= 0.1 - ROUNDING, "noise {noise}, delay {delay}, seed {seed}: {clearance}");
         assert!(report.per_robot[0].x > 3.8, "noise {noise}, delay {delay}, seed {seed}: {report:?}");
+    }
+}
+
+/// The largest acceleration is one way to write that there is no limit: robots keep clear, and come to where they are led.
+#[test]
+fn an_acceleration_limit_beyond_all_robots_is_none() {
+    let two = "title = \"two\"\nradius = 0.2\nlinks = { kind = \"nearest\", count = 1 }\n\
+               robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [3.0, 0.0] }]\n\
+               leaders = [{ robots = [\"a\"], program = { kind = \"path\", points = [{ at = 3.0, displacement = [3.0, 0.0] }] } }, \
+               { robots = [\"b\"], program = { kind = \"path\", points = [{ at = 3.0, displacement = [-3.0, 0.0] }] } }]\n\
+               limits = { speed = 1.0, clearance = 0.1 }\ncontrol = { period = 0.1 }\n";
+    for (model, most) in
+        [SINGLE, IDEAL].into_iter().flat_map(|model| [1e9, 1e17, 1e300].map(|most| (model, most)))
+    {
+        let set = [
+            format!("flight={{ duration = 20.0, model = {model} }}"),
+            format!("limits.acceleration={most:e}"),
+        ];
+        let swarm =
+            Swarm::parse("two", "two.toml", two, &set, None).unwrap_or_else(|error| panic!("{error}"));
+        let (_, report) = fly(&swarm, &mut |_, _| ControlFlow::Continue(())).expect("flies");
+        let clearance = report.clearance.expect("two robots");
+        assert!(clearance >= 0.1 - ROUNDING, "{model}, {most}: {clearance}");
+        let apart = [report.per_robot[0].x - 3.0, report.per_robot[1].x];
+        assert!(apart.iter().all(|x| x.abs() < 1e-6), "{model}, {most}: {report:?}");
     }
 }
 
