@@ -332,13 +332,13 @@ fn figures_of<'a>(results: &'a Results<'_>, subject: &'a Subject<'_>, units: &'a
     if !probes.is_empty() {
         figures.push(("probes".into(), Box::new(move || figures::probes(subject, probes))));
     }
-    if let Some(solved) = &outcome.solved {
-        let title = &scene.raw.title;
-        let draw = move || figures::chart::draw_residuals(title, solved.solver.name(), &solved.residuals);
-        figures.push(("residuals".into(), Box::new(draw)));
-    }
-    if let Some(chart) = load::chart(scene, units, load_steps) {
-        figures.push(("load".into(), Box::new(move || figures::chart::draw(&chart))));
+    let residuals = outcome.solved.as_ref().and_then(|solved| {
+        figures::chart::titled_residuals(&scene.raw.title, solved.solver.name(), &solved.residuals)
+    });
+    for (name, chart) in [("residuals", residuals), ("load", load::chart(scene, units, load_steps))] {
+        if let Some(chart) = chart {
+            figures.push((name.into(), Box::new(move || figures::chart::draw(&chart))));
+        }
     }
     figures
 }

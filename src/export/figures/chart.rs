@@ -330,25 +330,28 @@ fn draw_series(svg: &mut Svg, chart: &Chart, axes: &Axes, series: &Series) {
     svg.group(attributes, |svg| places.iter().for_each(|&place| svg.circle(place, radius)));
 }
 
-/// A solver's residual, iteration by iteration.
-pub fn residuals(residuals: &[f64]) -> Chart {
+/// A solver's residual, iteration by iteration; `None` where nothing acts, which leaves none.
+pub fn residuals(residuals: &[f64]) -> Option<Chart> {
+    if !residuals.iter().any(|&residual| residual > 0.0) {
+        return None;
+    }
     let points = residuals.iter().enumerate().map(|(n, &residual)| [n as f64, residual]).collect();
-    Chart::new(
+    Some(Chart::new(
         "Convergence of the solver",
         "residual force over the load's",
         [Axis::new("iteration", ""), Axis::log("residual", "")],
         vec![Series::new("", super::colour::SERIES[0], Style::Line, points)],
-    )
+    ))
 }
 
-/// The same as a figure that stands alone.
-pub fn draw_residuals(title: &str, solver: &str, values: &[f64]) -> String {
-    let mut chart = residuals(values);
+/// The same for a figure that stands alone.
+pub fn titled_residuals(title: &str, solver: &str, values: &[f64]) -> Option<Chart> {
+    let mut chart = residuals(values)?;
     chart.title = title.to_owned();
     chart.note = format!("residual of {solver}, {}", counted(values.len().saturating_sub(1), "iteration"));
     chart.y.quantity = "residual force over load".into();
     chart.series[0].name = solver.to_owned();
-    draw(&chart)
+    Some(chart)
 }
 
 /// Of a long line, the ends and extremes of each stretch.

@@ -108,6 +108,9 @@ impl<'a> Map<'a> {
         if !self.swarm.raw.obstacles.is_empty() {
             legend.push(Key::new("obstacle", OBSTACLE, Mark::Dot));
         }
+        if self.swarm.raw.limits.geofence.is_some() {
+            legend.push(Key::new("fence", OBSTACLE, Mark::DashedLine));
+        }
         legend
     }
 

@@ -29,7 +29,7 @@ pub fn write(
     let mut plots = probes::charts(results.probes, outcome.engine.body(), scene.unit());
     let units = Units::of(scene);
     plots.extend(load::chart(scene, &units, results.load_steps));
-    plots.extend(outcome.solved.as_ref().map(|solved| chart::residuals(&solved.residuals)));
+    plots.extend(outcome.solved.as_ref().and_then(|solved| chart::residuals(&solved.residuals)));
     let page = Page {
         title: scene.raw.title.clone(),
         command: format!("flockform run {}", scene.name),

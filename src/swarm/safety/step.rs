@@ -442,6 +442,10 @@ fn add_border(
         planes.push(HalfPlane { normal, offset: offset + dot(normal, minus(standing, here)) });
     };
     push(normal, away);
+    // Amid where the other may be there is no way from all of that: one that keeps clear of it otherwise may leave.
+    if sine >= 1.0 && !go_away {
+        return;
+    }
     for sine in [sine, -sine] {
         push([cosine * normal[0] - sine * normal[1], sine * normal[0] + cosine * normal[1]], 0.0);
     }

@@ -163,6 +163,11 @@ impl Watch {
         self.members[member].age(now)
     }
 
+    /// Whether ranges have contradicted a pose of the member and confirmed none since.
+    pub fn is_doubted(&self, member: usize) -> bool {
+        self.members[member].is_doubted
+    }
+
     /// How many of a member's poses were believed, and why the others were not.
     pub fn counts(&self, member: usize) -> &Counts {
         &self.members[member].counts
