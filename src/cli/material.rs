@@ -15,21 +15,10 @@ use super::names::{FileName, Overrides, SceneArguments};
 
 /// Options that say what a scene says. The changes to a scene conflict with them too: clap waives a requirement that
 /// what is given conflicts with.
+#[rustfmt::skip]
 const WITHOUT_SCENE: [&str; 14] = [
-    "lattice",
-    "spacing",
-    "a",
-    "b",
-    "angle",
-    "orientation",
-    "neighbours",
-    "weights",
-    "young",
-    "poisson",
-    "shear",
-    "fiber_angle",
-    "plane",
-    "thickness",
+    "lattice", "spacing", "a", "b", "angle", "orientation", "neighbours", "weights", "young", "poisson",
+    "shear", "fiber_angle", "plane", "thickness",
 ];
 
 /// A question: a scene's rule, a rule given by its lattice and weights, or a material given by its

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::OutputFolder;
-use super::csv::write;
+use super::csv::{row, write};
 use super::error::ExportError;
 use super::figures::{self, Pair};
 use super::summary::write_signed;
@@ -73,27 +73,6 @@ pub struct ReferenceSize {
     pub stated_energy_error: Option<f64>,
     /// Of the finite elements themselves \[force length\].
     pub strain_energy: f64,
-}
-
-#[derive(Serialize)]
-struct ParticleRow {
-    id: usize,
-    x: f64,
-    y: f64,
-    role: &'static str,
-    ux_rule: f64,
-    uy_rule: f64,
-    /// Empty for a particle outside the shape, which has no true value.
-    ux_truth: Option<f64>,
-    uy_truth: Option<f64>,
-}
-
-#[derive(Serialize)]
-struct CellRow {
-    x: f64,
-    y: f64,
-    von_mises_rule: f64,
-    von_mises_truth: f64,
 }
 
 impl ComparisonReport {
@@ -163,13 +142,14 @@ fn write_particles(folder: &OutputFolder, compared: &Compared) -> Result<PathBuf
     let reference = &engine.body().reference;
     let rows = (0..reference.len()).map(|i| {
         let known = |values: &[f64]| truth.knows(i).then(|| values[i]);
-        ParticleRow {
+        row! {
             id: i + 1,
             x: reference.x[i],
             y: reference.y[i],
             role: engine.roles()[i].name(),
             ux_rule: compared.rule.x[i],
             uy_rule: compared.rule.y[i],
+            // Empty for a particle outside the shape, which has no true value.
             ux_truth: known(&truth.displacement.x),
             uy_truth: known(&truth.displacement.y),
         }
@@ -180,11 +160,9 @@ fn write_particles(folder: &OutputFolder, compared: &Compared) -> Result<PathBuf
 /// Centre \[length\] and stress \[force / length^2\] of every cell.
 fn write_cells(folder: &OutputFolder, compared: &Compared) -> Result<PathBuf, ExportError> {
     let centres = compared.cells.centres(&compared.outcome.engine.body().reference);
-    let rows = (0..centres.len()).map(|cell| CellRow {
-        x: centres.x[cell],
-        y: centres.y[cell],
-        von_mises_rule: compared.von_mises_rule[cell],
-        von_mises_truth: compared.von_mises_truth[cell],
+    let rows = (0..centres.len()).map(|cell| {
+        let [rule, truth] = [&compared.von_mises_rule, &compared.von_mises_truth].map(|values| values[cell]);
+        row! { x: centres.x[cell], y: centres.y[cell], von_mises_rule: rule, von_mises_truth: truth }
     });
     write(folder, "cells.csv", rows)
 }

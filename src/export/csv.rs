@@ -25,6 +25,22 @@ use crate::flock::fracture::Break;
 use crate::material::stress::StressState;
 use crate::ranks::Team;
 
+/// A row of a table: its columns by name, each with its value or that of the variable of this name.
+macro_rules! row {
+    ($($column:ident $(: $value:expr)?),* $(,)?) => {{
+        #[allow(non_camel_case_types, non_snake_case, reason = "a column gives the type of its values its name")]
+        let row = {
+            #[derive(::serde::Serialize)]
+            struct Row<$($column),*> {
+                $($column: $column),*
+            }
+            Row { $($column $(: $value)?),* }
+        };
+        row
+    }};
+}
+pub(super) use row;
+
 #[derive(Serialize)]
 struct FinalRow {
     id: usize,
@@ -52,35 +68,6 @@ struct FinalRow {
     stress_xy: Option<Option<f64>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     von_mises: Option<Option<f64>>,
-}
-
-#[derive(Serialize)]
-struct ProbeRow {
-    step: usize,
-    id: usize,
-    x: f64,
-    y: f64,
-    pe1: f64,
-    pe2: f64,
-}
-
-#[derive(Serialize)]
-struct BreakRow {
-    step: usize,
-    id_a: usize,
-    id_b: usize,
-    #[serde(rename = "X")]
-    reference_x: f64,
-    #[serde(rename = "Y")]
-    reference_y: f64,
-    along: f64,
-    length: f64,
-}
-
-#[derive(Serialize)]
-struct ResidualRow {
-    iteration: usize,
-    residual: f64,
 }
 
 /// Writes every particle at the end: reference and present place \[length\], PE1 \[length^2\], PE2 \[length\], the
@@ -252,16 +239,15 @@ pub(crate) fn write_breaks(
     let along = body.along();
     let rows = breaks.iter().map(|one| {
         let [id_a, id_b] = body.ids(one.pair);
-        let [reference_x, reference_y] = one.place;
-        let (step, along, length) = (one.step, along(one.place), one.length);
-        BreakRow { step, id_a, id_b, reference_x, reference_y, along, length }
+        let ([x, y], along) = (one.place, along(one.place));
+        row! { step: one.step, id_a, id_b, X: x, Y: y, along, length: one.length }
     });
     write(folder, "breaks.csv", rows)
 }
 
 /// Writes the residual before the first iteration of a solver and after each.
 pub(crate) fn write_residuals(folder: &OutputFolder, residuals: &[f64]) -> Result<PathBuf, ExportError> {
-    let row = |(iteration, &residual): (usize, &f64)| ResidualRow { iteration, residual };
+    let row = |(iteration, &residual): (usize, &f64)| row! { iteration, residual };
     write(folder, "residuals.csv", residuals.iter().enumerate().map(row))
 }
 
@@ -276,7 +262,7 @@ pub fn write_probes(
         probes.iter().filter(move |probe| step < probe.positions.len()).map(move |probe| {
             let [x, y] = probe.positions.get(step);
             let id = body.id_of(probe.particle);
-            ProbeRow { step, id, x, y, pe1: probe.pe1[step], pe2: probe.pe2[step] }
+            row! { step, id, x, y, pe1: probe.pe1[step], pe2: probe.pe2[step] }
         })
     });
     write(folder, "probes.csv", rows)

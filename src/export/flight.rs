@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::OutputFolder;
-use super::csv::write;
+use super::csv::{row, write};
 use super::error::ExportError;
 use super::figures::chart::{Axis, Chart, Series, Style, draw_below_each_other};
 use super::figures::{self, SERIES, flight_map};
@@ -25,14 +25,6 @@ struct Report<'a> {
     #[serde(flatten)]
     report: &'a FlightReport,
     swarm: &'a crate::scene::swarm::raw::RawSwarm,
-}
-
-#[derive(Serialize)]
-struct TrackRow<'a> {
-    time: f64,
-    name: &'a str,
-    x: f64,
-    y: f64,
 }
 
 /// Writes everything.
@@ -64,7 +56,7 @@ pub fn write_flight_tables(
 ) -> Result<Vec<PathBuf>, ExportError> {
     let tracks = record.times.iter().zip(&record.tracks).flat_map(|(&time, places)| {
         let named = report.per_robot.iter().zip(places.iter());
-        named.map(move |(robot, [x, y])| TrackRow { time, name: &robot.name, x, y })
+        named.map(move |(robot, [x, y])| row! { time, name: &robot.name, x, y })
     });
     let whole = Report { holds: report.holds(), report, swarm: &swarm.raw };
     Ok(vec![

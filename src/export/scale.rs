@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use super::csv::row;
 use super::error::ExportError;
 use super::figures::SERIES;
 use super::figures::chart::{Axis, Chart, Series, Style, draw_below_each_other};
@@ -13,31 +14,19 @@ use crate::bench::scale::large::AtRest;
 use crate::bench::scale::model::Link;
 use crate::bench::scale::{Case, Predicted, Report};
 
-#[derive(Serialize)]
-struct Row {
-    scaling: &'static str,
-    ranks: usize,
-    columns: usize,
-    rows: usize,
-    seconds_per_step: f64,
-    alone_seconds_per_step: f64,
-    efficiency: f64,
-    share_in_exchange: f64,
-    predicted_seconds_per_step: f64,
-}
-
 /// Writes everything; times in \[s\].
 ///
 /// # Errors
 /// The first file that cannot be written.
 pub fn write_scale(folder: &OutputFolder, report: &Report) -> Result<Vec<PathBuf>, ExportError> {
-    let rows = |scaling, cases: &[Case]| cases.iter().map(move |case| row(scaling, *case)).collect();
-    let rows: [Vec<Row>; 2] = [rows("strong", &report.strong), rows("weak", &report.weak)];
-    write_study(folder, "scale", rows.into_iter().flatten(), &figure(report), report)
+    let cases = [("strong", &report.strong), ("weak", &report.weak)];
+    let rows =
+        cases.into_iter().flat_map(|(scaling, cases)| cases.iter().map(move |case| row(scaling, case)));
+    write_study(folder, "scale", rows, &figure(report), report)
 }
 
-fn row(scaling: &'static str, case: Case) -> Row {
-    Row {
+fn row(scaling: &'static str, case: &Case) -> impl Serialize {
+    row! {
         scaling,
         ranks: case.ranks,
         columns: case.body[0],

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::OutputFolder;
-use super::csv::write;
+use super::csv::{row, write};
 use super::error::ExportError;
 use super::figures::chart::{Axis, Chart, Landmark, Series, Style, draw_below_each_other};
 use super::figures::{self, SERIES};
@@ -25,17 +25,6 @@ struct Report<'a> {
     study: &'a Study,
 }
 
-#[derive(Serialize)]
-struct Row {
-    parameter: &'static str,
-    value: f64,
-    /// `spectrum`, `run` or `bisection`.
-    source: &'static str,
-    growth_per_step: f64,
-    steps: Option<usize>,
-    settled: Option<bool>,
-}
-
 /// Writes everything; without thresholds there is no growth to write.
 ///
 /// # Errors
@@ -43,7 +32,7 @@ struct Row {
 pub fn write_stability(folder: &OutputFolder, study: &Study) -> Result<Vec<PathBuf>, ExportError> {
     let mut written = Vec::new();
     if let Some(linear) = &study.linear {
-        written.push(write(folder, "growth.csv", rows(linear).into_iter())?);
+        written.push(write(folder, "growth.csv", rows(linear))?);
         written.extend(figures::write(&figure(study, linear), folder, "growth")?);
     }
     written.push(write_signed(folder, FILE, &Report::of(study))?);
@@ -61,33 +50,26 @@ impl<'a> Report<'a> {
     }
 }
 
-fn rows(linear: &Linear) -> Vec<Row> {
-    let run = |parameter: &'static str, source: &'static str, run: &Growth| Row {
-        parameter,
-        value: run.value,
-        source,
-        growth_per_step: run.per_step,
-        steps: Some(run.steps),
-        settled: Some(run.settled),
-    };
+fn rows(linear: &Linear) -> impl Iterator<Item = impl Serialize> {
+    // Of a spectrum, a run or a bisection; the first takes no steps.
+    let row =
+        |parameter: &'static str, source: &'static str, [value, growth]: [f64; 2], run: Option<&Growth>| {
+            let (steps, settled) = (run.map(|run| run.steps), run.map(|run| run.settled));
+            row! { parameter, value, source, growth_per_step: growth, steps, settled }
+        };
+    let run = |parameter, source, run: &Growth| row(parameter, source, [run.value, run.per_step], Some(run));
     let mut rows = Vec::new();
     for sweep in &linear.sweeps {
         let name = sweep.parameter.name();
-        rows.extend(sweep.spectrum.iter().map(|point| Row {
-            parameter: name,
-            value: point.value,
-            source: "spectrum",
-            growth_per_step: point.radius,
-            steps: None,
-            settled: None,
-        }));
+        let spectrum = sweep.spectrum.iter();
+        rows.extend(spectrum.map(|point| row(name, "spectrum", [point.value, point.radius], None)));
         rows.extend(sweep.runs.iter().map(|one| run(name, "run", one)));
     }
     for threshold in &linear.thresholds {
         let runs = threshold.found.iter().flat_map(|found| &found.runs);
         rows.extend(runs.map(|one| run(threshold.parameter.name(), "bisection", one)));
     }
-    rows
+    rows.into_iter()
 }
 
 const THRESHOLD: &str = "#a33b2a";

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use super::csv::row;
 use super::error::ExportError;
 use super::figures::chart::{Axis, Chart, Landmark, Series, Style, draw};
 use super::figures::{INK, SERIES};
@@ -12,22 +13,6 @@ use super::{OutputFolder, write_study};
 use crate::scene::text::counted;
 use crate::solve::equilibrium::Solver;
 use crate::study::trade::{Outcome, Point, RuleChoice, Study};
-
-#[derive(Serialize)]
-struct Row<'a> {
-    rule: &'static str,
-    spacing: f64,
-    particles: usize,
-    solver: &'static str,
-    tolerance: f64,
-    bits: u32,
-    outcome: &'static str,
-    error: Option<f64>,
-    seconds: Option<f64>,
-    iterations: Option<usize>,
-    on_the_front: bool,
-    reason: &'a str,
-}
 
 /// Writes everything.
 ///
@@ -39,9 +24,9 @@ pub fn write_trade(folder: &OutputFolder, study: &Study) -> Result<Vec<PathBuf>,
     write_study(folder, "trade", rows, &figure(study), study)
 }
 
-fn row(point: &Point, on_the_front: bool) -> Row<'_> {
+fn row(point: &Point, on_the_front: bool) -> impl Serialize {
     let (outcome, reason) = point.outcome.words();
-    Row {
+    row! {
         rule: point.setting.rule.name(),
         spacing: point.setting.spacing,
         particles: point.particles,

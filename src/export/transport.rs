@@ -5,30 +5,13 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use super::csv::row;
 use super::error::ExportError;
 use super::figures::SERIES;
 use super::figures::chart::{Axis, Chart, Series, Style, draw_below_each_other};
 use super::{OutputFolder, write_study};
 use crate::bench::transport::Report;
 use crate::bench::transport::measure::{Case, Work};
-
-#[derive(Serialize)]
-struct Row {
-    transport: &'static str,
-    work: &'static str,
-    poses: usize,
-    samples: usize,
-    lost: usize,
-    round_trip_p50: Option<f64>,
-    round_trip_p90: Option<f64>,
-    round_trip_p99: Option<f64>,
-    round_trip_p999: Option<f64>,
-    one_way_p50: Option<f64>,
-    one_way_p90: Option<f64>,
-    one_way_p99: Option<f64>,
-    one_way_p999: Option<f64>,
-    cpu_per_message: Option<f64>,
-}
 
 /// Writes everything; times in \[s\].
 ///
@@ -38,9 +21,9 @@ pub fn write_transport(folder: &OutputFolder, report: &Report) -> Result<Vec<Pat
     write_study(folder, "transport", report.cases.iter().map(row), &figure(report), report)
 }
 
-fn row(case: &Case) -> Row {
+fn row(case: &Case) -> impl Serialize {
     let (there, one) = (&case.round_trip, &case.one_way);
-    Row {
+    row! {
         transport: case.transport,
         work: case.work.name(),
         poses: case.poses,

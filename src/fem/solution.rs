@@ -42,12 +42,6 @@ impl Solution {
         Solution { strain, ..self }
     }
 
-    /// The measure of strain. Of stretches, strain and stress are those in axes that turn with the body, from the
-    /// mesh's.
-    pub fn strain(&self) -> Strain {
-        self.strain
-    }
-
     /// The undeformed mesh.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
@@ -61,11 +55,6 @@ impl Solution {
     /// The material of a cell.
     fn material_of(&self, cell: usize) -> &Material {
         self.inclusions.material(cell, &self.material)
-    }
-
-    /// The material, outside inclusions.
-    pub fn material(&self) -> &Material {
-        &self.material
     }
 
     /// Displacement along x at the nodes \[m\], shape \[nodes\].

@@ -18,9 +18,6 @@ pub struct Affine {
 }
 
 impl Affine {
-    /// Leaves everything where it is.
-    pub const NONE: Affine = Affine { about: [0.0; 2], translate: [0.0; 2], matrix: IDENTITY };
-
     /// Where a place is carried to \[length, world frame\].
     pub fn apply(&self, place: [f64; 2]) -> [f64; 2] {
         let about = self.about;

@@ -20,44 +20,14 @@
 //! Every TOML example is loaded by the tests, every command line is checked against the program, and the Rust
 //! examples are doctests.
 
-#[doc = include_str!("scenes.md")]
-pub mod scenes {}
+macro_rules! guides {
+    ($($name:ident)*) => {$(
+        #[doc = include_str!(concat!(stringify!($name), ".md"))]
+        pub mod $name {}
+    )*};
+}
 
-#[doc = include_str!("materials.md")]
-pub mod materials {}
-
-#[doc = include_str!("accuracy.md")]
-pub mod accuracy {}
-
-#[doc = include_str!("fracture.md")]
-pub mod fracture {}
-
-#[doc = include_str!("swarms.md")]
-pub mod swarms {}
-
-#[doc = include_str!("live.md")]
-pub mod live {}
-
-#[doc = include_str!("ros2.md")]
-pub mod ros2 {}
-
-#[doc = include_str!("security.md")]
-pub mod security {}
-
-#[doc = include_str!("shared_memory.md")]
-pub mod shared_memory {}
-
-#[doc = include_str!("python.md")]
-pub mod python {}
-
-#[doc = include_str!("performance.md")]
-pub mod performance {}
-
-#[doc = include_str!("ranks.md")]
-pub mod ranks {}
-
-#[doc = include_str!("files.md")]
-pub mod files {}
-
-#[doc = include_str!("theory.md")]
-pub mod theory {}
+guides! {
+    scenes materials accuracy fracture swarms live ros2 security shared_memory python performance ranks files
+    theory
+}

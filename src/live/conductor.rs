@@ -290,7 +290,6 @@ impl Conductor {
         let published = Published {
             number: self.number,
             frame: encoded(&frame, self.step_time, self.frame_time),
-            layout,
             roles: roles(&self.session.roles()),
             broken: Arc::new(self.session.broken()),
             lineage: self.lineage,

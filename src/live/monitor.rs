@@ -104,11 +104,6 @@ impl Monitor {
         self.commands.iter().flat_map(|link| link.answers.try_iter())
     }
 
-    /// The swarm that is flown.
-    pub fn swarm(&self) -> &File {
-        &self.file
-    }
-
     /// Whether viewers may send commands.
     pub(crate) fn takes_commands(&self) -> bool {
         self.commands.is_some()

@@ -18,8 +18,6 @@ pub struct Published {
     pub number: u64,
     /// As the page unpacks it.
     pub frame: Bytes,
-    /// Changes with every other layout: the page is loaded anew.
-    pub layout: u64,
     /// Roles of particles, as the page unpacks them.
     pub roles: Bytes,
     /// Broken bonds; of one `lineage` a longer list begins as a shorter one.

@@ -142,11 +142,6 @@ impl MaterialWeights {
         Ok(Self { neighbours, class, rows, cells })
     }
 
-    /// Number of particles.
-    pub fn count(&self) -> usize {
-        self.class.len()
-    }
-
     /// The row of a particle.
     pub fn of(&self, particle: usize) -> &Row {
         &self.rows[self.class[particle] as usize]
@@ -199,7 +194,7 @@ impl MaterialWeights {
             let ([fx, fy], [x, y]) = (self.force(i, displacement), displacement.get(i));
             fx * x + fy * y
         };
-        -0.5 * (0..self.count()).map(work).sum::<f64>()
+        -0.5 * (0..self.class.len()).map(work).sum::<f64>()
     }
 }
 

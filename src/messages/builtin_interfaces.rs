@@ -1,26 +1,26 @@
 //! `builtin_interfaces`: time.
 
-use serde::{Deserialize, Serialize};
+use super::messages;
 
-/// A point in time, since an epoch that the clock chooses.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct Time {
-    /// Whole seconds, rounded down.
-    pub sec: i32,
-    /// Nanoseconds after them, below 1e9.
-    pub nanosec: u32,
+messages! { "builtin_interfaces";
+    /// A point in time, since an epoch that the clock chooses.
+    #[derive(Copy, Eq, PartialOrd, Ord)]
+    Time {
+        /// Whole seconds, rounded down.
+        sec: i32,
+        /// Nanoseconds after them, below 1e9.
+        nanosec: u32,
+    }
+
+    /// A span of time.
+    #[derive(Copy, Eq, PartialOrd, Ord)]
+    Duration {
+        /// Whole seconds, rounded down.
+        sec: i32,
+        /// Nanoseconds after them, below 1e9.
+        nanosec: u32,
+    }
 }
-
-/// A span of time.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct Duration {
-    /// Whole seconds, rounded down.
-    pub sec: i32,
-    /// Nanoseconds after them, below 1e9.
-    pub nanosec: u32,
-}
-
-super::messages!("builtin_interfaces": Time, Duration);
 
 impl Time {
     /// From seconds since the epoch, to the nearest nanosecond; beyond what 32 bits hold (the year

@@ -1,24 +1,22 @@
 //! `diagnostic_msgs`: what `/diagnostics` carries.
 
-use serde::{Deserialize, Serialize};
-
+use super::messages;
 use super::std_msgs::Header;
 
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct KeyValue {
-    pub key: String,
-    pub value: String,
-}
+messages! { "diagnostic_msgs";
+    KeyValue { key: String, value: String }
 
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct DiagnosticStatus {
-    /// One of the constants.
-    pub level: u8,
-    /// Component this is about.
-    pub name: String,
-    pub message: String,
-    pub hardware_id: String,
-    pub values: Vec<KeyValue>,
+    DiagnosticStatus {
+        /// One of the constants.
+        level: u8,
+        /// Component this is about.
+        name: String,
+        message: String,
+        hardware_id: String,
+        values: Vec<KeyValue>,
+    }
+
+    DiagnosticArray { header: Header, status: Vec<DiagnosticStatus> }
 }
 
 impl DiagnosticStatus {
@@ -27,11 +25,3 @@ impl DiagnosticStatus {
     pub const ERROR: u8 = 2;
     pub const STALE: u8 = 3;
 }
-
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct DiagnosticArray {
-    pub header: Header,
-    pub status: Vec<DiagnosticStatus>,
-}
-
-super::messages!("diagnostic_msgs": KeyValue, DiagnosticStatus, DiagnosticArray);

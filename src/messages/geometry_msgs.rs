@@ -6,20 +6,26 @@
 use serde::{Deserialize, Serialize};
 use serde_big_array::BigArray;
 
+use super::messages;
 use super::std_msgs::Header;
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Point {
-    pub x: f64,
-    pub y: f64,
-    pub z: f64,
-}
+messages! { "geometry_msgs";
+    #[derive(Copy)] Point { x: f64, y: f64, z: f64 }
+    #[derive(Copy)] Vector3 { x: f64, y: f64, z: f64 }
+    #[derive(Copy)] Pose { position: Point, orientation: Quaternion }
+    PoseStamped { header: Header, pose: Pose }
+    PoseWithCovarianceStamped { header: Header, pose: PoseWithCovariance }
+    PoseArray { header: Header, poses: Vec<Pose> }
+    #[derive(Copy)] Twist { linear: Vector3, angular: Vector3 }
+    TwistStamped { header: Header, twist: Twist }
+    #[derive(Copy)] Transform { translation: Vector3, rotation: Quaternion }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Vector3 {
-    pub x: f64,
-    pub y: f64,
-    pub z: f64,
+    TransformStamped {
+        header: Header,
+        /// The frame whose pose in `header.frame_id` this is.
+        child_frame_id: String,
+        transform: Transform,
+    }
 }
 
 /// An orientation; `Default` is none, (0, 0, 0, 1).
@@ -31,47 +37,11 @@ pub struct Quaternion {
     pub w: f64,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Pose {
-    pub position: Point,
-    pub orientation: Quaternion,
-}
-
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct PoseStamped {
-    pub header: Header,
-    pub pose: Pose,
-}
-
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PoseWithCovariance {
     pub pose: Pose,
     #[serde(with = "BigArray")]
     pub covariance: [f64; 36],
-}
-
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct PoseWithCovarianceStamped {
-    pub header: Header,
-    pub pose: PoseWithCovariance,
-}
-
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct PoseArray {
-    pub header: Header,
-    pub poses: Vec<Pose>,
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Twist {
-    pub linear: Vector3,
-    pub angular: Vector3,
-}
-
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct TwistStamped {
-    pub header: Header,
-    pub twist: Twist,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -81,24 +51,7 @@ pub struct TwistWithCovariance {
     pub covariance: [f64; 36],
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Transform {
-    pub translation: Vector3,
-    pub rotation: Quaternion,
-}
-
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct TransformStamped {
-    pub header: Header,
-    /// The frame whose pose in `header.frame_id` this is.
-    pub child_frame_id: String,
-    pub transform: Transform,
-}
-
-super::messages!("geometry_msgs":
-    Point, Vector3, Quaternion, Pose, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped,
-    PoseArray, Twist, TwistStamped, TwistWithCovariance, Transform, TransformStamped,
-);
+messages!("geometry_msgs": Quaternion, PoseWithCovariance, TwistWithCovariance);
 
 impl Default for Quaternion {
     fn default() -> Self {

@@ -38,9 +38,28 @@ pub mod wire;
 pub use interface::{Message, ServiceType};
 pub use said::{escaped, said};
 
-/// Names the messages of one package after their structs.
+/// Structs with all that a message needs besides its name; the attributes of each may derive more.
+macro_rules! structs {
+    ($($(#[$about:meta])* $name:ident { $($(#[$of:meta])* $field:ident: $kind:ty),* $(,)? })+) => {$(
+        $(#[$about])*
+        #[derive(Clone, Debug, Default, PartialEq, ::serde::Serialize, ::serde::Deserialize)]
+        pub struct $name { $($(#[$of])* pub $field: $kind,)* }
+    )+};
+}
+use structs;
+
+/// The messages of one package, each with all fields of its `.msg` file in their order; or names for structs that are
+/// written out elsewhere.
 macro_rules! messages {
-    ($package:literal: $($message:ident),+ $(,)?) => {$(
+    ($package:literal; $($(#[$about:meta])* $name:ident { $($fields:tt)* })+) => {$(
+        $crate::messages::structs! {
+            #[doc = concat!("`", $package, "/msg/", stringify!($name), "`.")]
+            $(#[$about])*
+            $name { $($fields)* }
+        }
+        $crate::messages::messages!($package: $name);
+    )+};
+    ($package:literal: $($message:ident),+) => {$(
         impl $crate::messages::Message for $message {
             const PACKAGE: &'static str = $package;
             const NAME: &'static str = stringify!($message);
@@ -49,9 +68,9 @@ macro_rules! messages {
 }
 use messages;
 
-/// A service of one package, by the structs of its request and response.
-macro_rules! service {
-    ($(#[$about:meta])* $name:ident, $package:literal, $request:ident => $response:ident) => {
+/// The services of one package, each by the structs of its request and response.
+macro_rules! services {
+    ($package:literal; $($(#[$about:meta])* $name:ident: $request:ident => $response:ident;)+) => {$(
         #[doc = concat!("`", $package, "/srv/", stringify!($name), "`.")]
         $(#[$about])*
         pub struct $name;
@@ -62,6 +81,6 @@ macro_rules! service {
             type Request = $request;
             type Response = $response;
         }
-    };
+    )+};
 }
-use service;
+use services;

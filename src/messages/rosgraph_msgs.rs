@@ -1,13 +1,9 @@
 //! `rosgraph_msgs`: simulated time.
 
-use serde::{Deserialize, Serialize};
-
 use super::builtin_interfaces::Time;
+use super::messages;
 
-/// The message of `/clock`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Clock {
-    pub clock: Time,
+messages! { "rosgraph_msgs";
+    /// The message of `/clock`.
+    #[derive(Copy)] Clock { clock: Time }
 }
-
-super::messages!("rosgraph_msgs": Clock);

@@ -3,26 +3,28 @@
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::builtin_interfaces::Time;
+use super::messages;
 
-/// When, and in which frame.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Header {
-    pub stamp: Time,
-    /// Coordinate frame, without a leading slash.
-    pub frame_id: String,
+messages! { "std_msgs";
+    /// When, and in which frame.
+    Header {
+        stamp: Time,
+        /// Coordinate frame, without a leading slash.
+        frame_id: String,
+    }
+
+    /// A colour, each part from 0 to 1.
+    #[derive(Copy)]
+    ColorRGBA {
+        r: f32,
+        g: f32,
+        b: f32,
+        /// Opacity.
+        a: f32,
+    }
 }
 
-/// A colour, each part from 0 to 1.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct ColorRGBA {
-    pub r: f32,
-    pub g: f32,
-    pub b: f32,
-    /// Opacity.
-    pub a: f32,
-}
-
-super::messages!("std_msgs": Header, ColorRGBA, Empty);
+messages!("std_msgs": Empty);
 
 /// A struct without fields: one zero byte on the wire, which some peers leave out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

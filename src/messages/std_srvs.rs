@@ -1,24 +1,21 @@
 //! Package `std_srvs`.
 
-use serde::{Deserialize, Serialize};
-
-use super::service;
 use super::std_msgs::Empty;
+use super::{services, structs};
 
-service!(Trigger, "std_srvs", Empty => Outcome);
-
-/// Whether what was asked for was done.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Outcome {
-    pub success: bool,
-    /// For people.
-    pub message: String,
+services! { "std_srvs";
+    Trigger: Empty => Outcome;
+    SetBool: SetBoolRequest => Outcome;
 }
 
-service!(SetBool, "std_srvs", SetBoolRequest => Outcome);
+structs! {
+    /// Whether what was asked for was done.
+    Outcome {
+        success: bool,
+        /// For people.
+        message: String,
+    }
 
-/// Request of [`SetBool`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct SetBoolRequest {
-    pub data: bool,
+    /// Request of [`SetBool`].
+    #[derive(Copy)] SetBoolRequest { data: bool }
 }

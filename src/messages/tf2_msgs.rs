@@ -1,12 +1,8 @@
 //! `tf2_msgs`: what `/tf` carries.
 
-use serde::{Deserialize, Serialize};
-
 use super::geometry_msgs::TransformStamped;
+use super::messages;
 
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct TFMessage {
-    pub transforms: Vec<TransformStamped>,
+messages! { "tf2_msgs";
+    TFMessage { transforms: Vec<TransformStamped> }
 }
-
-super::messages!("tf2_msgs": TFMessage);

@@ -5,82 +5,75 @@
 
 use std::fmt::Write as _;
 
-use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::definitions::{contained, definition, trimmed};
 use super::diagnostic_msgs::KeyValue;
-use super::service;
+use super::{messages, services, structs};
 
-/// `msg/FieldType`.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct FieldType {
-    /// Of the element; 48 more for an array of fixed length, 96 for a bounded sequence, 144 for one without a bound.
-    pub type_id: u8,
-    /// Length of an array, bound of a sequence.
-    pub capacity: u64,
-    /// Bound of a string.
-    pub string_capacity: u64,
-    /// `package/msg/Name`; empty where the element is no message.
-    pub nested_type_name: String,
+messages! { "type_description_interfaces";
+    FieldType {
+        /// Of the element; 48 more for an array of fixed length, 96 for a bounded sequence, 144 for one without a bound.
+        type_id: u8,
+        /// Length of an array, bound of a sequence.
+        capacity: u64,
+        /// Bound of a string.
+        string_capacity: u64,
+        /// `package/msg/Name`; empty where the element is no message.
+        nested_type_name: String,
+    }
+
+    Field {
+        name: String,
+        #[serde(rename = "type")]
+        kind: FieldType,
+        /// As text; empty where there is none.
+        #[serde(default)]
+        default_value: String,
+    }
+
+    IndividualTypeDescription {
+        /// `package/msg/Name`.
+        type_name: String,
+        fields: Vec<Field>,
+    }
+
+    TypeDescription {
+        type_description: IndividualTypeDescription,
+        /// All that it contains, by ascending name.
+        referenced_type_descriptions: Vec<IndividualTypeDescription>,
+    }
+
+    TypeSource {
+        type_name: String,
+        /// Kind of the file: its ending.
+        encoding: String,
+        raw_file_contents: String,
+    }
 }
 
-/// `msg/Field`.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Field {
-    pub name: String,
-    #[serde(rename = "type")]
-    pub kind: FieldType,
-    /// As text; empty where there is none.
-    #[serde(default)]
-    pub default_value: String,
+services! { "type_description_interfaces";
+    GetTypeDescription: GetTypeDescriptionRequest => GetTypeDescriptionResponse;
 }
 
-/// `msg/IndividualTypeDescription`.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct IndividualTypeDescription {
-    /// `package/msg/Name`.
-    pub type_name: String,
-    pub fields: Vec<Field>,
-}
+structs! {
+    /// Request of [`GetTypeDescription`].
+    GetTypeDescriptionRequest {
+        /// `package/msg/Name`.
+        type_name: String,
+        /// As `RIHS01_` and 64 digits.
+        type_hash: String,
+        include_type_sources: bool,
+    }
 
-/// `msg/TypeDescription`.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct TypeDescription {
-    pub type_description: IndividualTypeDescription,
-    /// All that it contains, by ascending name.
-    pub referenced_type_descriptions: Vec<IndividualTypeDescription>,
-}
-
-/// `msg/TypeSource`.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct TypeSource {
-    pub type_name: String,
-    /// Kind of the file: its ending.
-    pub encoding: String,
-    pub raw_file_contents: String,
-}
-
-service!(GetTypeDescription, "type_description_interfaces", GetTypeDescriptionRequest => GetTypeDescriptionResponse);
-
-/// Request of [`GetTypeDescription`].
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct GetTypeDescriptionRequest {
-    /// `package/msg/Name`.
-    pub type_name: String,
-    /// As `RIHS01_` and 64 digits.
-    pub type_hash: String,
-    pub include_type_sources: bool,
-}
-
-/// Response of [`GetTypeDescription`].
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct GetTypeDescriptionResponse {
-    pub successful: bool,
-    pub failure_reason: String,
-    pub type_description: TypeDescription,
-    pub type_sources: Vec<TypeSource>,
-    pub extra_information: Vec<KeyValue>,
+    /// Response of [`GetTypeDescription`].
+    GetTypeDescriptionResponse {
+        successful: bool,
+        failure_reason: String,
+        type_description: TypeDescription,
+        type_sources: Vec<TypeSource>,
+        extra_information: Vec<KeyValue>,
+    }
 }
 
 impl TypeDescription {

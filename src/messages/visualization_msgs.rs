@@ -1,55 +1,48 @@
 //! `visualization_msgs` as of Iron and later: shapes that RViz and Foxglove draw.
 
-use serde::{Deserialize, Serialize};
-
 use super::builtin_interfaces::Duration;
 use super::geometry_msgs::{Point, Pose, Vector3};
+use super::messages;
 use super::sensor_msgs::CompressedImage;
 use super::std_msgs::{ColorRGBA, Header};
 
-/// A place in a texture, each part from 0 to 1.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct UVCoordinate {
-    pub u: f32,
-    pub v: f32,
-}
+messages! { "visualization_msgs";
+    /// A place in a texture, each part from 0 to 1.
+    #[derive(Copy)] UVCoordinate { u: f32, v: f32 }
+    MeshFile { filename: String, data: Vec<u8> }
 
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct MeshFile {
-    pub filename: String,
-    pub data: Vec<u8>,
-}
+    /// One shape, or many of a kind.
+    Marker {
+        header: Header,
+        /// With `id`, what the marker is known by: the same two replace it.
+        ns: String,
+        id: i32,
+        /// Shape, one of the constants.
+        r#type: i32,
+        /// [`Marker::ADD`] (the same as modify), [`Marker::DELETE`] or [`Marker::DELETEALL`].
+        action: i32,
+        pose: Pose,
+        /// Size \[m\]; for lines, `x` is their width.
+        scale: Vector3,
+        color: ColorRGBA,
+        /// How long it stays; zero is forever.
+        lifetime: Duration,
+        /// Moves with its frame between updates.
+        frame_locked: bool,
+        /// Points of lines and lists, relative to `pose` \[m\].
+        points: Vec<Point>,
+        /// One for each point, or none.
+        colors: Vec<ColorRGBA>,
+        texture_resource: String,
+        texture: CompressedImage,
+        uv_coordinates: Vec<UVCoordinate>,
+        text: String,
+        mesh_resource: String,
+        mesh_file: MeshFile,
+        mesh_use_embedded_materials: bool,
+    }
 
-/// One shape, or many of a kind.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Marker {
-    pub header: Header,
-    /// With `id`, what the marker is known by: the same two replace it.
-    pub ns: String,
-    pub id: i32,
-    /// Shape, one of the constants.
-    pub r#type: i32,
-    /// [`Marker::ADD`] (the same as modify), [`Marker::DELETE`] or [`Marker::DELETEALL`].
-    pub action: i32,
-    pub pose: Pose,
-    /// Size \[m\]; for lines, `x` is their width.
-    pub scale: Vector3,
-    pub color: ColorRGBA,
-    /// How long it stays; zero is forever.
-    pub lifetime: Duration,
-    /// Moves with its frame between updates.
-    pub frame_locked: bool,
-    /// Points of lines and lists, relative to `pose` \[m\].
-    pub points: Vec<Point>,
-    /// One for each point, or none.
-    pub colors: Vec<ColorRGBA>,
-    pub texture_resource: String,
-    pub texture: CompressedImage,
-    pub uv_coordinates: Vec<UVCoordinate>,
-    pub text: String,
-    pub mesh_resource: String,
-    pub mesh_file: MeshFile,
-    pub mesh_use_embedded_materials: bool,
+    MarkerArray { markers: Vec<Marker> }
 }
 
 impl Marker {
@@ -72,10 +65,3 @@ impl Marker {
     pub const DELETE: i32 = 2;
     pub const DELETEALL: i32 = 3;
 }
-
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct MarkerArray {
-    pub markers: Vec<Marker>,
-}
-
-super::messages!("visualization_msgs": UVCoordinate, MeshFile, Marker, MarkerArray);

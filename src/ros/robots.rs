@@ -248,11 +248,6 @@ impl RobotNodes {
         format!("{}{others} on {}; poses to {poses}, targets from {targets}", first.name(), first.options())
     }
 
-    /// Flies until `stop` is set.
-    pub fn run(&mut self, stop: &AtomicBool) {
-        self.run_while(stop, &mut |_| true);
-    }
-
     /// As [`FormationNode::run_while`](super::node::FormationNode::run_while).
     pub fn run_while(&mut self, stop: &AtomicBool, look: &mut dyn FnMut(&Self) -> bool) -> bool {
         while !stop.load(Ordering::Relaxed) {

@@ -19,58 +19,20 @@ macro_rules! files {
 }
 
 /// Every bundled scene, in the order in which `flockform list scenes` lists them.
-pub const SCENES: &[Bundled] = files!["scenes":
-    "tension",
-    "tension-immediate",
-    "feedback-grow",
-    "feedback-oscillate",
-    "feedback-overrelax",
-    "poisson-term",
-    "distance-weights",
-    "geometric-mean",
-    "power-mean",
-    "shear",
-    "second-gradient",
-    "gradient-layer",
-    "fracture",
-    "fracture-slow",
-    "fracture-hexagonal",
-    "notched-plate",
-    "drop",
-    "grips",
-    "lattice-square",
-    "lattice-rectangular",
-    "lattice-centred-rectangular",
-    "lattice-hexagonal",
-    "lattice-oblique",
-    "lattice-honeycomb",
-    "bar",
-    "cook",
-    "plate-hole",
-    "inclusion",
-    "ring",
-    "l-bracket",
-    "rubber-block",
-    "elastica",
-    "beam",
-    "beam-5",
-    "beam-10",
-    "beam-loaded",
-    "beam-second",
-    "beam-hexagonal",
-    "beam-paper",
-    "beam-paper-5",
-    "beam-paper-10",
-    "beam-paper-ring",
-    "beam-paper-second",
-    "beam-paper-reduced",
-    "beam-paper-hexagonal",
-    "beam-paper-hexagonal-reduced",
-];
+pub const SCENES: &[Bundled] = files! { "scenes":
+    "tension", "tension-immediate", "feedback-grow", "feedback-oscillate", "feedback-overrelax",
+    "poisson-term", "distance-weights", "geometric-mean", "power-mean", "shear", "second-gradient",
+    "gradient-layer", "fracture", "fracture-slow", "fracture-hexagonal", "notched-plate", "drop", "grips",
+    "lattice-square", "lattice-rectangular", "lattice-centred-rectangular", "lattice-hexagonal",
+    "lattice-oblique", "lattice-honeycomb", "bar", "cook", "plate-hole", "inclusion", "ring", "l-bracket",
+    "rubber-block", "elastica", "beam", "beam-5", "beam-10", "beam-loaded", "beam-second", "beam-hexagonal",
+    "beam-paper", "beam-paper-5", "beam-paper-10", "beam-paper-ring", "beam-paper-second",
+    "beam-paper-reduced", "beam-paper-hexagonal", "beam-paper-hexagonal-reduced",
+};
 
 /// Every bundled swarm, in the order in which `flockform list swarms` lists them.
 pub const SWARMS: &[Bundled] =
-    files!["swarms": "square", "gap", "patch", "antipodal", "faulty-robot", "bridge"];
+    files! { "swarms": "square", "gap", "patch", "antipodal", "faulty-robot", "bridge" };
 
 /// The bundled swarm of this name.
 pub fn bundled_swarm(name: &str) -> Option<Bundled> {

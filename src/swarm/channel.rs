@@ -115,11 +115,6 @@ impl Channel {
         self.sender = sender;
     }
 
-    /// The kind that the robot is at present.
-    pub fn sender(&self) -> Sender {
-        self.sender
-    }
-
     /// Sends the true pose of the robot in this period; periods must not go back.
     pub fn send(&mut self, period: u64, pose: Pose) {
         let pose = match self.sender {

@@ -55,11 +55,6 @@ impl Deadlines {
         *self = Self { missed, ..Self::new(now + 1.0 / rate, rate) };
     }
 
-    /// Ticks left out since the beginning \[1\].
-    pub fn missed(&self) -> u64 {
-        self.missed
-    }
-
     /// Time at `now` since the tick that was begun last was due; 0 before there was one.
     fn lateness(&self, now: f64) -> f64 {
         self.tick.checked_sub(1).map_or(0.0, |tick| now - (self.start + tick as f64 * self.period))
@@ -167,11 +162,6 @@ impl Pace {
         self.followed.iter_mut().for_each(|followed| followed.set_rate(rate));
         self.deadlines.set_rate(self.origin.elapsed().as_secs_f64(), rate);
     }
-
-    /// Ticks left out since the beginning \[1\].
-    pub fn missed(&self) -> u64 {
-        self.deadlines.missed()
-    }
 }
 
 #[cfg(test)]
@@ -192,7 +182,7 @@ mod tests {
                 }
             }
         }
-        (begun, deadlines.missed())
+        (begun, deadlines.missed)
     }
 
     #[test]

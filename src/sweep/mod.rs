@@ -32,7 +32,6 @@ pub use schedule::{Activity, Led, MOST_STEPS};
 pub(crate) use schedule::{Stage, Steps};
 
 use crate::flock::frame::Frame;
-use crate::flock::halo::Halo;
 use crate::flock::lanes::vectors;
 use crate::flock::law::{Flock, Weights};
 use crate::flock::role::Role;
@@ -159,11 +158,6 @@ impl Sweep {
     /// The same, for what is to be learned of the other ranks.
     pub(crate) fn domain_mut(&mut self) -> Option<&mut Domain> {
         self.domain.as_mut()
-    }
-
-    /// The exchange of ranks before they take so many steps together; empty where the body is not shared.
-    pub fn halo(&self, steps: usize) -> Halo {
-        self.domain.as_ref().map_or_else(Halo::default, |domain| domain.halo(steps))
     }
 
     /// How many particles each rank receives before so many steps, shape \[ranks\]; nothing where the body is not shared.

@@ -151,7 +151,7 @@ fn a_peer_gets_and_sets_parameters_within_their_bounds() {
     let swarm = node(domain);
     let mut store = Store::default();
     store.declare(Declaration::new("rate", 50.0).range(1.0..=500.0), None).expect("declared once");
-    let mut parameters = Parameters::new(&swarm, store).expect("services");
+    let mut parameters = Parameters::open(&swarm, store, true).expect("services");
     let mut changes = Vec::new();
     let found = findings("parameters", domain, || changes.extend(parameters.poll(0.0, None)));
     assert_eq!(
@@ -174,7 +174,7 @@ fn a_peer_gets_and_sets_parameters_within_their_bounds() {
 fn a_peer_drives_the_lifecycle() {
     let domain = domain();
     let swarm = node(domain);
-    let mut lifecycle = Lifecycle::new(&swarm).expect("services");
+    let mut lifecycle = Lifecycle::open(&swarm, [true; 2]).expect("services");
     let found = findings("lifecycle", domain, || lifecycle.poll(0.0, &|_| true, &mut |_| Outcome::Success));
     let expected = [
         json!({"state": "unconfigured"}),

@@ -15,7 +15,7 @@ fn a_lifecycle_is_driven_from_outside() {
     };
     let mut peers = peers();
     let node = peers.ours.node("/", "managed").expect("a node");
-    let mut lifecycle = Lifecycle::new(&node).expect("services");
+    let mut lifecycle = Lifecycle::open(&node, [true; 2]).expect("services");
     let observer = peers.theirs.node("/", "manager").expect("a node");
     let events = observer
         .subscription::<TransitionEvent>("/managed/transition_event", Quality::reliable(10))

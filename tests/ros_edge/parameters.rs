@@ -19,7 +19,7 @@ fn parameters(node: &Node) -> Parameters {
     ] {
         store.declare(declaration, None).expect("declared once");
     }
-    Parameters::new(node, store).expect("services")
+    Parameters::open(node, store, true).expect("services")
 }
 
 fn settings(settings: &[(&str, Value)]) -> rcl_interfaces::Settings {

@@ -1,4 +1,4 @@
-//! What every transport promises, kept by each of them: within a process, over shared memory, over ROS 2.
+//! What every transport promises, kept by each of them: over shared memory and over ROS 2.
 //!
 //! [`promises`] are written once against the two ends of a transport; each transport's file calls them and adds what
 //! it alone can break. Processes that are killed are this test program, started again with a task ([`child`]).
@@ -8,7 +8,6 @@
 mod child;
 #[path = "../common/folders.rs"]
 mod folders;
-mod in_process;
 mod killed;
 mod leftovers;
 mod positions;

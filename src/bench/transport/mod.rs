@@ -75,14 +75,6 @@ pub struct Ratio {
     pub ratio: f64,
 }
 
-impl Report {
-    /// The case of a way.
-    pub fn case(&self, transport: &str, work: Work, poses: usize) -> Option<&Case> {
-        let is_it = |case: &&Case| case.transport == transport && case.work == work && case.poses == poses;
-        self.cases.iter().find(is_it)
-    }
-}
-
 /// A pose of a round: its number is its member, and every coordinate differs from the others.
 fn pose(k: usize) -> Pose {
     Pose { member: k as u32, frame: 0, position: [k as f64, 0.5], yaw: 0.25, stamp: 0.0 }

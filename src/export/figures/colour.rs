@@ -25,32 +25,14 @@ pub const SERIES: [&str; 12] = [
 ];
 
 /// The colour map viridis at every tenth.
-const VIRIDIS: [[u8; 3]; 11] = [
-    [0x44, 0x01, 0x54],
-    [0x48, 0x24, 0x75],
-    [0x41, 0x44, 0x87],
-    [0x35, 0x5f, 0x8d],
-    [0x2a, 0x78, 0x8e],
-    [0x21, 0x91, 0x8c],
-    [0x22, 0xa8, 0x84],
-    [0x44, 0xbf, 0x70],
-    [0x7a, 0xd1, 0x51],
-    [0xbd, 0xdf, 0x26],
-    [0xfd, 0xe7, 0x25],
+const VIRIDIS: [u32; 11] = [
+    0x440154, 0x482475, 0x414487, 0x355f8d, 0x2a788e, 0x21918c, 0x22a884, 0x44bf70, 0x7ad151, 0xbddf26,
+    0xfde725,
 ];
 
 /// The diverging colour map of K. Moreland (Advances in Visual Computing, LNCS 5876, 2009) at every eighth.
-const BLUE_TO_RED: [[u8; 3]; 9] = [
-    [59, 76, 192],
-    [98, 130, 234],
-    [141, 176, 254],
-    [184, 208, 249],
-    [221, 221, 221],
-    [245, 196, 173],
-    [244, 154, 123],
-    [222, 96, 77],
-    [180, 4, 38],
-];
+const BLUE_TO_RED: [u32; 9] =
+    [0x3b4cc0, 0x6282ea, 0x8db0fe, 0xb8d0f9, 0xdddddd, 0xf5c4ad, 0xf49a7b, 0xde604d, 0xb40426];
 
 /// Viridis, perceptually uniform, at `fraction` of its way from dark to bright.
 pub fn viridis(fraction: f64) -> String {
@@ -63,13 +45,14 @@ pub fn blue_to_red(fraction: f64) -> String {
 }
 
 /// The colour at `fraction` of the way along a map.
-fn along(map: &[[u8; 3]], fraction: f64) -> String {
+fn along(map: &[u32], fraction: f64) -> String {
     let last = map.len() - 1;
     let place = fraction.clamp(0.0, 1.0) * last as f64;
     let below = (place as usize).min(last - 1);
     let part = place - below as f64;
     let mix = |channel: usize| {
-        let [from, to] = [map[below], map[below + 1]].map(|colour| f64::from(colour[channel]));
+        let value = |colour: u32| f64::from(colour.to_be_bytes()[1 + channel]);
+        let [from, to] = [map[below], map[below + 1]].map(value);
         (from + part * (to - from)).round() as u8
     };
     format!("#{:02x}{:02x}{:02x}", mix(0), mix(1), mix(2))

@@ -22,36 +22,18 @@ pub const FILE: &str = "report.html";
 
 const PAGE: &str = include_str!("web/page.html");
 pub(super) const STYLE: &str = include_str!("web/page.css");
+macro_rules! scripts {
+    ($($name:ident)*) => {[$(include_str!(concat!("web/", stringify!($name), ".js"))),*]};
+}
+
 /// In the order in which they build on each other.
-const SCRIPTS: [&str; 19] = [
-    include_str!("web/unpack.js"),
-    include_str!("web/colour.js"),
-    include_str!("web/marks.js"),
-    include_str!("web/body.js"),
-    include_str!("web/shown.js"),
-    include_str!("web/painter.js"),
-    include_str!("web/painter2d.js"),
-    include_str!("web/view.js"),
-    include_str!("web/chart.js"),
-    include_str!("web/player.js"),
-    include_str!("web/scale.js"),
-    include_str!("web/camera.js"),
-    include_str!("web/compare.js"),
-    include_str!("web/numbers.js"),
-    include_str!("web/svg_pen.js"),
-    include_str!("web/picture.js"),
-    include_str!("web/controls.js"),
-    include_str!("web/address.js"),
-    include_str!("web/page.js"),
-];
+const SCRIPTS: [&str; 19] = scripts! {
+    unpack colour marks body shown painter painter2d view chart player scale camera compare numbers svg_pen
+    picture controls address page
+};
 
 /// Those of a page whose data come from a session, after the others.
-const LIVE_SCRIPTS: [&str; 4] = [
-    include_str!("web/live_frames.js"),
-    include_str!("web/live_tools.js"),
-    include_str!("web/live_design.js"),
-    include_str!("web/live.js"),
-];
+const LIVE_SCRIPTS: [&str; 4] = scripts! { live_frames live_tools live_design live };
 const LIVE_TOOLS: &str = include_str!("web/live.html");
 
 /// Everything that a report shows, from the top.

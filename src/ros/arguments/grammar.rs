@@ -11,24 +11,11 @@ use crate::messages::remap::RemapRule;
 use crate::scene::text;
 
 /// Every flag that may follow `--ros-args`.
+#[rustfmt::skip]
 pub const FLAGS: [&str; 17] = [
-    "-r",
-    "--remap",
-    "-p",
-    "--param",
-    "--params-file",
-    "--log-level",
-    "--log-config-file",
-    "--log-file-name",
-    "-e",
-    "--enclave",
-    "--enable-rosout-logs",
-    "--disable-rosout-logs",
-    "--enable-stdout-logs",
-    "--disable-stdout-logs",
-    "--enable-external-lib-logs",
-    "--disable-external-lib-logs",
-    "--ros-args",
+    "-r", "--remap", "-p", "--param", "--params-file", "--log-level", "--log-config-file", "--log-file-name",
+    "-e", "--enclave", "--enable-rosout-logs", "--disable-rosout-logs", "--enable-stdout-logs",
+    "--disable-stdout-logs", "--enable-external-lib-logs", "--disable-external-lib-logs", "--ros-args",
 ];
 
 /// Splits arguments at `--ros-args ... [--]` (any number of times) and reads the ROS ones.

@@ -91,11 +91,9 @@ pub struct RawBody {
     #[serde(default)]
     pub inclusions: Vec<RawInclusion>,
     /// Whether the body keeps the outline of its shape; `fitted` for the rule `material`, `lattice` for others.
-    #[serde(default)]
     pub outline: Option<RawOutline>,
     /// Where the lattice has a site [length]. Unless given: the lower left corner of the shape's
     /// bounds, the centre of a disc, or the end of a specimen's axis.
-    #[serde(default)]
     pub anchor: Option<[f64; 2]>,
 }
 
@@ -128,7 +126,6 @@ pub struct RawStep {
     /// Where it ends [length].
     pub to: [f64; 2],
     /// The centre of an arc, as far from its beginning as from its end; an edge has none [length].
-    #[serde(default)]
     pub centre: Option<[f64; 2]>,
     /// Whether the arc runs clockwise.
     #[serde(default)]

@@ -62,7 +62,6 @@ pub enum RawLoad {
         /// Along x and y [force / length^2].
         traction: [f64; 2],
         /// How it varies along the outline; not at all unless given.
-        #[serde(default)]
         profile: Option<RawProfile>,
     },
     /// On the part of the outline that lies in the region, along the normal of the undeformed outline and on its
@@ -73,7 +72,6 @@ pub enum RawLoad {
         /// Positive pushes into the body [force / length^2].
         pressure: f64,
         /// How it varies along the outline; not at all unless given.
-        #[serde(default)]
         profile: Option<RawProfile>,
     },
     /// On each particle of the region.
@@ -113,10 +111,8 @@ pub struct RawEquilibrium {
     /// How near to elasticity the followers should come: the relative error of their displacements, as
     /// "1%" or 0.01. The rule (unless written), the spacing (the written one is the widest), tolerance and
     /// precision are then chosen, by what `flockform trade` has shown.
-    #[serde(default)]
     pub accuracy: Option<RawAccuracy>,
     /// Largest residual force over the load's at which the solver stops, up to twice that once it is found again from the places; 1e-8 unless an accuracy is given [1].
-    #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub tolerance: Option<f64>,
     /// Iterations after which the solver stops short of its tolerance [1].
@@ -124,7 +120,6 @@ pub struct RawEquilibrium {
     #[schemars(range(min = 1))]
     pub most_iterations: usize,
     /// Doubles unless an accuracy is given that singles reach.
-    #[serde(default)]
     pub precision: Option<RawPrecision>,
 }
 

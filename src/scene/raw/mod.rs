@@ -44,7 +44,6 @@ pub struct RawScene {
     #[schemars(length(min = 1))]
     pub stress_unit: Option<String>,
     /// The lattice from which the body is cut; a body of points has none.
-    #[serde(default)]
     pub lattice: Option<RawLattice>,
     /// The body that is cut from the lattice, or given as points.
     pub body: RawBody,
@@ -53,13 +52,11 @@ pub struct RawScene {
     pub frame: RawFrame,
     /// The first neighbours unless given; for the rule `material` all particles that share a cell of the
     /// lattice.
-    #[serde(default)]
     pub neighbours: Option<RawNeighbours>,
     /// How a follower's position comes from its neighbours'; the centre of gravity unless given.
     #[serde(default)]
     pub rule: RawRule,
     /// The material of the body; the rule `material` and loads need it.
-    #[serde(default)]
     pub material: Option<RawMaterial>,
     /// Everything that pushes the body, from the first step on unless `load_steps` says otherwise.
     #[serde(default)]
@@ -73,7 +70,6 @@ pub struct RawScene {
     #[serde(default)]
     pub roles: Vec<RawRoles>,
     /// Bonds break where this is given.
-    #[serde(default)]
     pub fracture: Option<RawFracture>,
     /// Cuts made before the first step: every bond that crosses one is broken.
     #[serde(default)]
@@ -85,7 +81,6 @@ pub struct RawScene {
     #[serde(default)]
     pub stop: RawStop,
     /// Finds where the followers come to rest, instead of stepping there.
-    #[serde(default)]
     pub equilibrium: Option<RawEquilibrium>,
     /// Puts loads on part by part and keeps what the body does meanwhile.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -15,17 +15,14 @@ pub struct RawRoles {
     pub role: RawRole,
     /// The one component that is held or led, for rollers and planes of symmetry; the particle follows along the
     /// other. Both unless given. For the rule `material`.
-    #[serde(default)]
     pub axis: Option<RawAxis>,
     /// First step at which the role holds [step]; 0 and 1 both mean from the start.
     #[serde(default)]
     pub from: usize,
     /// The role is taken, particle by particle, when this first holds (from step `from` on): once, and by no particle
     /// that a later entry has taken before. A run with `stop.tolerance` goes on until `from`, and no longer.
-    #[serde(default)]
     pub when: Option<RawWhen>,
     /// How leaders move; only they do.
-    #[serde(default)]
     pub motion: Option<RawMotion>,
 }
 
@@ -55,7 +52,6 @@ pub enum RawRegion {
         side: RawSide,
         /// How far in from the outermost coordinate [length]. Unless given it is a flat side itself, along a fitted outline; half
         /// a spacing where that is curved; and of whole cells half a row of the lattice, or as much as rows are staggered.
-        #[serde(default)]
         #[schemars(range(min = 0))]
         depth: Option<f64>,
     },
@@ -86,7 +82,6 @@ pub enum RawRegion {
     /// A part of the outline of the body's shape, or the particles on it. `flockform plan` prints its pieces.
     Outline {
         /// The outline of this hole, counted from 1 in the order of `body.holes`; the outer one unless given [1].
-        #[serde(default)]
         hole: Option<usize>,
         /// Numbers of its edges and arcs, counted from 1; all of them unless given. Those of a polygon begin at its
         /// vertices, those of a rectangle are bottom, right, top and left [1].
@@ -94,11 +89,9 @@ pub enum RawRegion {
         #[schemars(inner(range(min = 1)))]
         pieces: Vec<usize>,
         /// Of arcs alone: between these directions from their centres, counter-clockwise [degree].
-        #[serde(default)]
         angles: Option<[f64; 2]>,
         /// Instead of all of the above: from the place of the outline nearest to the first point to that nearest to
         /// the second, the shorter way [length].
-        #[serde(default)]
         between: Option<[[f64; 2]; 2]>,
     },
 }
@@ -124,10 +117,8 @@ pub struct RawWhen {
     /// The quantity that is compared with the bounds.
     pub quantity: RawQuantity,
     /// Holds above this value [unit of the quantity].
-    #[serde(default)]
     pub above: Option<f64>,
     /// Holds below this value [unit of the quantity].
-    #[serde(default)]
     pub below: Option<f64>,
 }
 

@@ -12,7 +12,6 @@ pub enum RawNeighbours {
     First {
         /// Keeps only this many, dropping from the end of: nearest first; equally near ones in
         /// opposite pairs by angle (east, west, north, south) [1].
-        #[serde(default)]
         #[schemars(range(min = 1))]
         keep: Option<usize>,
     },
@@ -199,7 +198,6 @@ pub struct RawPoisson {
     #[serde(default)]
     pub axis: RawAxis,
     /// Coordinate of the central axis [length]; the middle of the body unless given.
-    #[serde(default)]
     pub centre: Option<f64>,
     /// `da = sign(s) |s / half width|^exponent`, `s` being the distance from the axis: 1 is linear, 0 the
     /// sign alone [1].

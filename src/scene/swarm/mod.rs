@@ -105,14 +105,4 @@ impl Swarm {
     pub fn refuse(&self, key: &str, message: impl Into<String>, help: impl Into<String>) -> SceneError {
         SceneError::from(self.document.problem(key, message, Some(help.into())))
     }
-
-    /// The continuum scene behind the formation, where there is one.
-    pub fn scene(&self) -> Option<&Scene> {
-        match &self.shape {
-            Shape::Places(_) => None,
-            Shape::Body(scene) | Shape::Scene(scene) | Shape::Inside(scene) | Shape::Recorded(scene, _) => {
-                Some(scene)
-            }
-        }
-    }
 }

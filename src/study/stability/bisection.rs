@@ -49,13 +49,6 @@ pub struct Growth {
     pub settled: bool,
 }
 
-impl Growth {
-    /// Whether the disturbance was larger after a step than before.
-    pub fn grows(&self) -> bool {
-        self.per_step > 1.0
-    }
-}
-
 /// The value at which growth begins.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Found {

@@ -12,27 +12,10 @@ const TABLES: [&str; 10] =
 const BEYOND: &str = "1e999";
 
 /// Keys of lengths, wherever they stand.
+#[rustfmt::skip]
 const LENGTHS: [&str; 21] = [
-    "between",
-    "spacing",
-    "a",
-    "b",
-    "min",
-    "max",
-    "centre",
-    "radius",
-    "vertices",
-    "anchor",
-    "depth",
-    "per_step",
-    "displacement",
-    "about",
-    "amplitude",
-    "length",
-    "distance",
-    "thickness",
-    "scale",
-    "to",
+    "between", "spacing", "a", "b", "min", "max", "centre", "radius", "vertices", "anchor", "depth",
+    "per_step", "displacement", "about", "amplitude", "length", "distance", "thickness", "scale", "to",
     "places",
 ];
 

@@ -590,11 +590,6 @@ impl Control {
         self.watch.pose(member).map(|pose| pose.yaw)
     }
 
-    /// The member's velocity between its last two poses \[m/s\].
-    pub fn velocity(&self, member: usize) -> [f64; 2] {
-        self.velocity.get(member)
-    }
-
     /// How young the member's pose is.
     pub fn health(&self, member: usize) -> Health {
         self.watch.health(member)

@@ -5,16 +5,10 @@ use super::Robot;
 /// The limits of a double integrator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DoubleIntegrator {
-    /// Highest speed \[m/s\], default 1.
+    /// Highest speed \[m/s\].
     pub speed: f64,
-    /// Highest acceleration, and deceleration \[m/s^2\], default 1.
+    /// Highest acceleration, and deceleration \[m/s^2\].
     pub acceleration: f64,
-}
-
-impl Default for DoubleIntegrator {
-    fn default() -> Self {
-        Self { speed: 1.0, acceleration: 1.0 }
-    }
 }
 
 impl DoubleIntegrator {
@@ -105,7 +99,7 @@ mod tests {
     #[test]
     fn from_rest_it_brakes_in_time_and_lands_within_a_period_of_the_best_there_is() {
         for length in [1e-5, 0.01, 0.3, 0.9, 1.0, 7.3] {
-            let double = DoubleIntegrator::default();
+            let double = DoubleIntegrator { speed: 1.0, acceleration: 1.0 };
             let mut robot = Robot::at([0.0, 0.0], 0.0);
             // Bang-bang: 2 sqrt(l) below the speed limit, l + 1 above.
             let best: f64 = if length < 1.0 { 2.0 * f64::sqrt(length) } else { length + 1.0 };
@@ -141,7 +135,7 @@ mod tests {
             let angle = f64::from(turn) / 6.0 * std::f64::consts::PI;
             let mut robot = Robot { velocity: [angle.cos(), angle.sin()], ..Robot::at([0.0, 0.0], 0.0) };
             for _ in 0..400 {
-                DoubleIntegrator::default().step(&mut robot, [0.4, 0.2], DT);
+                DoubleIntegrator { speed: 1.0, acceleration: 1.0 }.step(&mut robot, [0.4, 0.2], DT);
             }
             assert!(distance(robot.position, [0.4, 0.2]) < 1e-9, "{robot:?}");
             assert!(robot.velocity[0].hypot(robot.velocity[1]) < 1e-9, "{robot:?}");

@@ -5,14 +5,8 @@ use super::Robot;
 /// The limit of a single integrator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Integrator {
-    /// Highest speed \[m/s\], default 1.
+    /// Highest speed \[m/s\].
     pub speed: f64,
-}
-
-impl Default for Integrator {
-    fn default() -> Self {
-        Self { speed: 1.0 }
-    }
 }
 
 impl Integrator {

@@ -101,9 +101,9 @@ mod tests {
     fn every_model() -> [Model; 4] {
         [
             Model::Ideal,
-            Model::Integrator(Integrator::default()),
+            Model::Integrator(Integrator { speed: 1.0 }),
             Model::Unicycle(Unicycle::default()),
-            Model::DoubleIntegrator(DoubleIntegrator::default()),
+            Model::DoubleIntegrator(DoubleIntegrator { speed: 1.0, acceleration: 1.0 }),
         ]
     }
 

@@ -1,8 +1,8 @@
 //! Transports carry poses in and targets out; the loop is the same over each of them.
 //!
 //! A transport has two ends. The loop holds a [`ControllerEnd`] and calls [`serve`] once a period; robots, or
-//! their simulation, hold a [`RobotsEnd`] and call [`fly`]. There are three: [`in_process`] here, shared
-//! memory in room `shm`, ROS 2 in room `ros`. The tests hold all of them to one list of promises:
+//! their simulation, hold a [`RobotsEnd`] and call [`fly`]. There are two: shared memory in room `shm`, ROS 2 in
+//! room `ros`. The tests hold both to one list of promises:
 //!
 //! * Poses of one member arrive in the order in which they were sent, or not at all: the newest matters, and a full
 //!   queue drops the oldest. A sender never waits for a receiver.
@@ -10,7 +10,6 @@
 //! * A payload that is no pose of a member is left out and counted.
 
 pub mod complaints;
-pub mod in_process;
 pub mod silence;
 
 use complaints::Complaints;

@@ -46,14 +46,6 @@ impl Services {
 }
 
 impl Lifecycle {
-    /// An unconfigured node.
-    ///
-    /// # Errors
-    /// As [`Node::service`].
-    pub fn new(node: &Node) -> Result<Self, EdgeError> {
-        Self::open(node, [true; 2])
-    }
-
     /// An unconfigured node, with services and with events where that is asked for.
     ///
     /// # Errors

@@ -80,14 +80,6 @@ impl Services {
 }
 
 impl Parameters {
-    /// Serves what the store declares.
-    ///
-    /// # Errors
-    /// As [`Node::service`].
-    pub fn new(node: &Node, store: Store) -> Result<Self, EdgeError> {
-        Self::open(node, store, true)
-    }
-
     /// Holds what the store declares, and serves it if `is_served`.
     ///
     /// # Errors

@@ -103,7 +103,6 @@ pub struct RawFault {
     #[schemars(range(min = 0))]
     pub at: f64,
     /// Until this time [s]; for good unless given.
-    #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub until: Option<f64>,
     /// The kind of the fault.

@@ -14,7 +14,6 @@ pub struct RawLeaders {
     #[serde(default)]
     pub robots: Vec<String>,
     /// By their place in the formation; on a lattice only.
-    #[serde(default)]
     pub region: Option<RawRegion>,
     /// The motion of these leaders.
     pub program: RawProgram,
@@ -72,7 +71,6 @@ pub struct RawManoeuvre {
     pub name: String,
     /// The point about which the formation is turned, stretched and sheared [m]; the middle of its places
     /// unless given.
-    #[serde(default)]
     pub about: Option<[f64; 2]>,
     /// Legs in the order in which they are flown.
     #[schemars(length(min = 1))]

@@ -44,28 +44,22 @@ pub struct RawSwarm {
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub radius: f64,
     /// A continuum scene as the formation.
-    #[serde(default)]
     pub scene: Option<RawBridge>,
     /// The lattice from which the body is cut.
-    #[serde(default)]
     pub lattice: Option<RawLattice>,
     /// The body whose particles are the robots.
-    #[serde(default)]
     pub body: Option<RawBody>,
     /// Virtual points around a body that give robots at its edge their full neighbourhood.
     #[serde(default)]
     pub frame: RawFrame,
     /// Neighbours on a lattice; the first neighbours unless given.
-    #[serde(default)]
     pub neighbours: Option<RawNeighbours>,
     /// Neighbours of robots that are given one by one; the six nearest unless given.
-    #[serde(default)]
     pub links: Option<RawLinks>,
     /// How a follower's target comes from its neighbours' positions.
     #[serde(default)]
     pub rule: RawRule,
     /// The material of the body; the rule `material` needs it.
-    #[serde(default)]
     pub material: Option<RawMaterial>,
     /// Leaders and their motions. Robots that no entry names follow.
     #[serde(default)]
@@ -83,10 +77,8 @@ pub struct RawSwarm {
     #[serde(default)]
     pub poses: RawPoses,
     /// Ranges that robots measure of each other.
-    #[serde(default)]
     pub ranges: Option<RawRanges>,
     /// Trims neighbours that stray: tolerance of robots that lie.
-    #[serde(default)]
     pub resilience: Option<RawResilience>,
     /// The control loop.
     #[serde(default)]
@@ -108,7 +100,6 @@ pub struct RawRobot {
     /// Its place in the formation [m].
     pub place: [f64; 2],
     /// Its radius, if not that of all robots [m].
-    #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub radius: Option<f64>,
     /// Its neighbours, by name; needs `links.kind = "listed"`.
@@ -154,7 +145,6 @@ pub struct RawBridge {
     pub set: Vec<String>,
     /// `probes.csv` of an earlier run, relative to this file: its steps are flown as targets by the
     /// particles that it holds.
-    #[serde(default)]
     pub recording: Option<String>,
 }
 
