@@ -64,7 +64,7 @@ impl Among<'_> {
         let (part, linkage) = linkage(body, (cells, &incidence), team);
         if has_loads || is_led_to_rest(scene) {
             let held = require_held(body, &incidence, (&part, &linkage), &held_axes(body, changes), team);
-            held.map_err(|mechanism| refuse_loose(scene, &mechanism))?;
+            held.map_err(|mechanism| refuse_loose(scene, mechanism))?;
         }
         let rigid = linkage.require_rigid(body.bounds());
         rigid.map_err(|mechanism| weights::refuse(scene, &WeightsError::Mechanism(mechanism)))

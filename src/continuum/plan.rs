@@ -28,6 +28,7 @@ use crate::geometry::outline::Outline;
 use crate::material::free_edge::FreeEdge;
 use crate::material::mechanism::{self, Mechanism};
 use crate::material::outline_loads::{Load, Resultant, sum};
+use crate::material::weights::WeightsError;
 use crate::ranks::Team;
 use crate::scene::{LoadSteps, Scene, SceneError, Stop};
 use crate::solve::linear::HeldComponent;
@@ -421,10 +422,14 @@ fn require_carried(
     }
     let incidence = cells.incidence(layout.body.count());
     let held = mechanism::require_held(cells, &incidence, &layout.body.reference, leads);
-    held.map_err(|mechanism| refuse_loose(scene, &mechanism))
+    held.map_err(|mechanism| refuse_loose(scene, mechanism))
 }
 
-pub(super) fn refuse_loose(scene: &Scene, mechanism: &Mechanism) -> SceneError {
+pub(super) fn refuse_loose(scene: &Scene, mechanism: Mechanism) -> SceneError {
+    // A body with a hinge is refused however it is held.
+    if let Mechanism::Hinge { .. } = mechanism {
+        return weights::refuse(scene, &WeightsError::Mechanism(mechanism));
+    }
     let help = "clamp or lead at least two particles of every part, or components that keep it from moving";
     scene.refuse("roles", mechanism.to_string(), help)
 }
