@@ -231,7 +231,7 @@ impl LatticeArguments {
         if kind.is_out_of_proportion() {
             return Err(wrong(
                 "--b",
-                "it makes an edge of the cell more than a million times as long as the cell is high above it",
+                "it makes the cell more than a million times as long as it is high",
                 "give edges of a like length, and an --angle farther from 0 and 180 degrees",
             ));
         }

@@ -7,7 +7,7 @@
 //! | `summary.json` | program, scene, counts, how it ended, energies, reactions, largest stress, first break, timings |
 //! | `final.csv` | every particle at the end |
 //! | `probes.csv` | the probed particles at every step |
-//! | `residuals.csv`, `residuals` | how near the solver came, iteration by iteration, where one was used |
+//! | `residuals.csv`, `residuals` | how near the solver came, iteration by iteration, where one was used; the figure where anything acts |
 //! | `load.csv`, `load` | what a load that changes does ([`load`]), where the scene has `[load_steps]` |
 //! | `breaks.csv` | every broken bond, with its step and place |
 //! | `steps.pvd`, `steps/*.vtu` | frames for ParaView |

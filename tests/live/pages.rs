@@ -18,7 +18,8 @@ use super::waits::within;
 /// Starts the program in a folder, where what it prints goes to a file `printed`.
 pub fn start(arguments: &[&str], folder: &Path) -> Running {
     let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
-    command.args(arguments).env("ROS_DOMAIN_ID", (101 + std::process::id() % 101).to_string());
+    // Above the domains of other tests, which may run meanwhile.
+    command.args(arguments).env("ROS_DOMAIN_ID", (229 + std::process::id() % 4).to_string());
     command.env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST").env_remove("RUST_LOG");
     let printed = File::create(folder.join("printed")).expect("a file");
     command.current_dir(folder).stdin(Stdio::null()).stdout(printed).stderr(Stdio::null());

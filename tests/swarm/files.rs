@@ -1,9 +1,11 @@
 //! What a swarm file may not say, and what the program answers.
 
+use std::ops::ControlFlow;
+
 use flockform::scene::SceneError;
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::control::Control;
-use flockform::swarm::flight::Flight;
+use flockform::swarm::flight::{Flight, fly};
 use flockform::swarm::plan::cautions;
 
 use super::support::*;
@@ -36,6 +38,10 @@ fn a_bad_swarm_file_is_refused_with_place_and_remedy() {
         ),
         (
             with("[scene]\nname = \"tension\"\n[rule]\nmean = { kind = \"barycentre\" }\n"),
+            "which says this itself",
+        ),
+        (
+            "title = \"t\"\n[scene]\nname = \"tension\"\n[rule]\npoisson = { k = -0.5 }\n".into(),
             "which says this itself",
         ),
         (
@@ -132,6 +138,18 @@ fn corners_that_follow_by_negative_weights_are_refused_and_named() {
     let report = refusal(text);
     assert!(report.contains("does not come to rest"), "{report}");
     assert!(report.contains("robot_1, robot_10, robot_91, robot_100"), "{report}");
+}
+
+/// A swarm file has no `update`: the formation is damped so as not to grow.
+#[test]
+fn a_lattice_with_a_second_gradient_keeps_its_formation() {
+    let text = "title = \"t\"\n[lattice]\nkind = \"square\"\nspacing = 1.0\n[body]\nshape = { kind = \"grid\", columns = 5, rows = 4 }\n\
+                [neighbours]\nkind = \"collinear\"\n[rule]\nweights = { kind = \"gradient\", length = 0.8 }\n\
+                [[leaders]]\nregion = { kind = \"ids\", ids = [1, 4, 17, 20] }\n\
+                program = { kind = \"path\", points = [{ at = 1.0, displacement = [0.3, 0.1] }] }\n[flight]\nduration = 60.0\n";
+    let (_, report) =
+        fly(&parse(text).expect("valid"), &mut |_, _| ControlFlow::Continue(())).expect("flies");
+    assert!(report.pe1[1] < 1e-9 && report.per_robot[9].x > 1.0, "{report:?}");
 }
 
 #[test]

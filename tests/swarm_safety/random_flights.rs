@@ -212,6 +212,7 @@ fn no_flight_falls_below_the_declared_clearance() {
 #[test]
 fn robots_that_are_lost_for_a_period_at_a_time_come_no_nearer() {
     const COUNT: usize = 8;
+    let mut lost = 0;
     for (seed, (period, delay, jitter)) in
         (0..48).zip([(0.25, 1, 2), (0.1, 3, 4), (0.2, 0, 4)].into_iter().cycle())
     {
@@ -247,7 +248,9 @@ fn robots_that_are_lost_for_a_period_at_a_time_come_no_nearer() {
         let (_, report) = fly(&swarm, &mut |_, _| ControlFlow::Continue(())).expect("flies");
         let clearance = report.clearance.expect("there are others");
         assert!(clearance >= 0.3 - ROUNDING, "delay {delay}, jitter {jitter}, seed {seed}: {clearance}");
+        lost += report.most_lost;
     }
+    assert!(lost > 48, "{lost} were lost");
 }
 
 /// Two that are led through each other at full speed, whose braking is as long as their way is known badly.

@@ -209,8 +209,7 @@ fn body(
         return Err(refuse("lattice", "is missing".into(), help));
     };
     if lattice.kind().is_out_of_proportion() {
-        let message =
-            "an edge of the cell is more than a million times as long as the cell is high above it".into();
+        let message = "the cell is more than a million times as long as it is high".into();
         return Err(refuse(
             "lattice",
             message,

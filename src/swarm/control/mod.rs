@@ -492,10 +492,8 @@ impl Control {
             let known = self.watch.place(member);
             self.known[member] = known.is_some();
             self.usable[member] = self.watch.health(member).is_usable();
-            // Where a lost member has gone is unknown: an age beyond the limit carries no more information. One of another node has
-            // gone on to a last target that is not known here.
-            let beyond = if self.serves[member] { 0.0 } else { self.period };
-            let oldest = self.watch.limits().age_limit + beyond;
+            // Where a lost member has gone is unknown: an age beyond the limit carries no more information.
+            let oldest = self.watch.limits().age_limit;
             let (place, age) = match (known, self.starts[member]) {
                 (Some(place), _) => {
                     (place, self.watch.age(member, now).map_or(oldest, |age| age.min(oldest)))
@@ -526,6 +524,10 @@ impl Control {
                 // One that was found to lie was elsewhere when it was sent there.
                 if follows && (self.usable[member] || !self.watch.is_doubted(member)) {
                     track.between(&mut stray.places);
+                }
+                // A lost one has gone on to its last target, which is not known here.
+                if stray.places.is_empty() && self.ages[member] >= self.watch.limits().age_limit {
+                    self.ages[member] += self.period;
                 }
                 continue;
             }

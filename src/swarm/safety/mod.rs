@@ -44,9 +44,9 @@
 //! Behind poses of now the hulls count too: one that lags is on its way to the target of a period ago, and where its next pose is lost
 //! that target counts, which has to have counted before. Of members that are where they were sent they are points.
 //!
-//! One that gets no targets because its pose is too old is in its hull if it did what it was sent to, and by its age anywhere if it did
-//! not. Others keep clear of the hull as before, and come no nearer to the rest: they do not go away from it, which may be towards
-//! where it is.
+//! One that gets no targets because its pose is too old is in its hull if it did what it was sent to, and by its age anywhere in a disc
+//! if it did not. Others keep clear of the hull as before and do not enter the disc. Those inside it come no nearer to its middle, and
+//! may leave: nothing drives them away from the middle, which may be towards the hull.
 //!
 //! # Members that take time to brake
 //! A double integrator that stands in its cell now may be unable to stay there. The ways on which members come to rest

@@ -329,7 +329,7 @@ impl Filter {
         flags: &mut Flags,
     ) {
         let most = self.limits.acceleration;
-        // Not as the difference of two times, which rounding takes all digits of where the limit is large.
+        // The difference of two times would lose all its digits where the limit is large.
         let step = |room: f64| {
             let time = (period * period + 2.0 * room / most).sqrt();
             (2.0 * room * period / (time + period)).min(room)
@@ -401,8 +401,8 @@ impl MotionRequest {
 
 /// Appends the half-planes that keep a member `here` on its own side of another, if they can matter
 /// within `reach` \[m\]: the module's docs prove it. `aside` is the direction to it where both stand at
-/// the very same place; `standing` is where the member stands if it goes nowhere. Both `keep` a distance \[m\], and where they are
-/// perhaps nearer go away from each other, or only come no nearer.
+/// the very same place; `standing` is where the member stands if it goes nowhere. They keep a distance \[m\]; where they are
+/// perhaps nearer the member goes away if it is to, and else comes no nearer.
 #[inline]
 fn add_border(
     planes: &mut Vec<HalfPlane>,
@@ -442,7 +442,7 @@ fn add_border(
         planes.push(HalfPlane { normal, offset: offset + dot(normal, minus(standing, here)) });
     };
     push(normal, away);
-    // Amid where the other may be there is no way from all of that: one that keeps clear of it otherwise may leave.
+    // Inside the disc no direction leads away from all of it: a member that is parted otherwise may leave.
     if sine >= 1.0 && !go_away {
         return;
     }
