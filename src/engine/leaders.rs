@@ -133,6 +133,16 @@ impl Engine {
         }
     }
 
+    /// Puts them there after a step: damping leads a rest offset only part of the way.
+    pub(super) fn place_components(&mut self) {
+        for (led, axis) in &self.led_components {
+            if let Some(place) = led.place(&self.changes, self.step) {
+                let component = if *axis == 0 { &mut self.present.x } else { &mut self.present.y };
+                component[led.particle] = place[*axis];
+            }
+        }
+    }
+
     /// Whether the motion of a single component goes on after this step.
     pub(super) fn moves_components(&self) -> bool {
         // By the changes: of a body in parts the particles may all be on other ranks.

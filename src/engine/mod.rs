@@ -322,6 +322,7 @@ impl Engine {
             Some(_) => self.step_shared(),
         }
         std::mem::swap(&mut self.present, &mut self.previous);
+        self.place_components();
         self.activity.forget();
         // The counts of all ranks are added up.
         if self.body.part.is_some() || self.team.as_ref().is_none_or(|(team, _)| team.is_first()) {

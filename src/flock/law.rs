@@ -325,7 +325,7 @@ impl Flock {
     /// however the body turns, the free one is in balance with that.
     pub(crate) fn hold_at(&mut self, particle: usize, axis: usize, place: f64) {
         let Some(mut offset) = self.rest.as_ref().map(|rest| rest.get(particle)) else { return };
-        offset[axis] = place;
+        offset[axis] = self.rule.held_offset(place, self.reference.get(particle)[axis]);
         if let (SMALL, Weights::Matrix(weights)) = (self.rule.mean, &self.weights) {
             let reference = self.reference.get(particle);
             let unmoved = self.rule.rest_offset(reference, self.seen(particle, &self.reference));

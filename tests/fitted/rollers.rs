@@ -80,6 +80,45 @@ fn a_roller_that_is_led_step_by_step_moves_the_body_as_one_that_is_solved_for() 
     }
 }
 
+/// However the rule damps or feeds back, a component that is led is where its motion has it, after each step and when that has ended.
+#[test]
+fn a_led_component_is_where_its_motion_says() {
+    let text = "title = \"led\"\nlattice = { kind = \"square\", spacing = 1.0 }\nrule = { mean = { kind = \"material\" } }\n\
+        body = { shape = { kind = \"rectangle\", max = [6.0, 4.0] } }\nmaterial = { kind = \"isotropic\", young = 1000.0, poisson = 0.3 }\n\
+        roles = [{ region = { kind = \"edge\", side = \"left\" }, role = \"clamped\" }, { region = { kind = \"edge\", side = \"right\" }, \
+        role = \"leader\", axis = \"y\", motion = { kind = \"keyframes\", frames = [{ step = 40, displacement = [0.0, 0.1] }] } }]\n\
+        stop = { steps = 90 }\n";
+    for sets in [
+        &[][..],
+        &["update.damping=0.5"],
+        &["update.damping=0.5", "rule.feedback={factor=-0.3}"],
+        &["rule.feedback={factor=0.01,reference=\"previous\"}"],
+        &["rule.feedback={factor=-0.3}", COROTATED],
+        &["update.order=\"sequential\"", "rule.feedback={factor=-0.3}"],
+    ] {
+        let sets: Vec<String> = sets.iter().map(|&set| set.to_owned()).collect();
+        let scene =
+            Scene::parse("led", "led.toml", text, &sets, None).unwrap_or_else(|error| panic!("{error}"));
+        let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
+        let led: Vec<usize> =
+            (0..plan.count()).filter(|&i| plan.setup.body.reference.get(i)[0] == 6.0).collect();
+        assert_eq!(led.len(), 5);
+        let outcome = run(plan, &mut |engine, _| {
+            let expected = 0.1 * (engine.step() as f64 / 40.0).min(1.0);
+            for &i in &led {
+                let [_, y] = engine.displacement(i);
+                assert!(
+                    (y - expected).abs() < 1e-14,
+                    "{sets:?}, step {}: {y}, not {expected}",
+                    engine.step()
+                );
+            }
+            ControlFlow::Continue(())
+        });
+        assert_eq!(outcome.engine.step(), 90, "{sets:?}");
+    }
+}
+
 /// A beam of depth 1 on two supports 20 apart, loaded along its top, whole or its right half on a plane of symmetry.
 fn bent(half: bool) -> (Scene, Plan, Outcome) {
     let from = if half { 0.0 } else { -10.0 };

@@ -1,14 +1,13 @@
 //! What a swarm file may not say, and what the program answers.
 
-use std::ops::ControlFlow;
-
 use flockform::scene::SceneError;
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::control::Control;
-use flockform::swarm::flight::{Flight, fly};
+use flockform::swarm::flight::Flight;
 use flockform::swarm::plan::cautions;
 
 use super::support::*;
+use crate::folders::temporary;
 use crate::swarms::load_swarm;
 
 const PAIR: &str = "title = \"t\"\n[[robots]]\nname = \"a\"\nplace = [0.0, 0.0]\n[[robots]]\nname = \"b\"\nplace = [1.0, 0.0]\n\
@@ -147,8 +146,7 @@ fn a_lattice_with_a_second_gradient_keeps_its_formation() {
                 [neighbours]\nkind = \"collinear\"\n[rule]\nweights = { kind = \"gradient\", length = 0.8 }\n\
                 [[leaders]]\nregion = { kind = \"ids\", ids = [1, 4, 17, 20] }\n\
                 program = { kind = \"path\", points = [{ at = 1.0, displacement = [0.3, 0.1] }] }\n[flight]\nduration = 60.0\n";
-    let (_, report) =
-        fly(&parse(text).expect("valid"), &mut |_, _| ControlFlow::Continue(())).expect("flies");
+    let (_, report) = flown(&parse(text).expect("valid"));
     assert!(report.pe1[1] < 1e-9 && report.per_robot[9].x > 1.0, "{report:?}");
 }
 
@@ -229,6 +227,22 @@ fn what_is_doubtful_is_a_caution_before_the_flight() {
     assert!(cautions[0].starts_with("no robot leads"), "{cautions:?}");
     let bounded = refusal(&format!("{apart}[flight.bounds]\nfinal_error = 0.1\n"));
     assert!(bounded.contains("no leader reaches `c`, `d`"), "{bounded}");
+}
+
+/// One file may have the ways of all robots: those of an entry's own count.
+#[test]
+fn rows_for_robots_of_other_entries_are_no_reason_for_caution() {
+    let folder = temporary();
+    let rows = "t,name,dx,dy\n0,a,0,0\n0,b,0,0\n10,a,1,0\n10,b,50,0\n";
+    std::fs::write(folder.path().join("ways.csv"), rows).expect("written");
+    let cautions = |robot: &str| {
+        let (robots, _) = PAIR.split_once("[[leaders]]").expect("leaders last");
+        let program = "program = { kind = \"file\", path = \"ways.csv\" }\n[limits]\nspeed = 1.0\n";
+        let text = format!("{robots}[[leaders]]\nrobots = [\"{robot}\"]\n{program}");
+        plan_of(&Swarm::parse("t", "t.toml", &text, &[], Some(folder.path())).expect("valid"))
+    };
+    assert!(cautions("b").iter().any(|one| one.contains("up to 5 m/s")), "{:?}", cautions("b"));
+    assert!(!cautions("a").iter().any(|one| one.contains("fall behind")), "{:?}", cautions("a"));
 }
 
 fn plan_of(swarm: &Swarm) -> Vec<String> {

@@ -208,6 +208,16 @@ impl Rule {
         [0, 1].map(|k| if stays[k] { own.present[k] } else { target[k] })
     }
 
+    /// The rest offset of a held component that feedback takes to `place`, and no farther.
+    pub(crate) fn held_offset(&self, place: f64, reference: f64) -> f64 {
+        match self.feedback {
+            Some(Feedback { factor, reference: FeedbackReference::Initial }) if factor != -1.0 => {
+                (place + factor * reference) / (1.0 + factor)
+            }
+            _ => place,
+        }
+    }
+
     #[inline]
     fn with_terms(&self, own: &ParticleState, mut target: [f64; 2]) -> [f64; 2] {
         if let Some(poisson) = &self.poisson {

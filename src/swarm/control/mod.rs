@@ -522,11 +522,13 @@ impl Control {
             if !self.brakes {
                 stray.places.clear();
                 // One that was found to lie was elsewhere when it was sent there.
-                if follows && (self.usable[member] || !self.watch.is_doubted(member)) {
+                let is_doubted = self.watch.is_doubted(member);
+                if follows && (self.usable[member] || !is_doubted) {
                     track.between(&mut stray.places);
                 }
                 // A lost one has gone on to its last target, which is not known here.
-                if stray.places.is_empty() && self.ages[member] >= self.watch.limits().age_limit {
+                let is_oldest = self.ages[member] >= self.watch.limits().age_limit;
+                if is_oldest && stray.places.is_empty() && !is_doubted {
                     self.ages[member] += self.period;
                 }
                 continue;

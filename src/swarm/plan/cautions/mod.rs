@@ -10,7 +10,7 @@ use crate::flock::motion::{Interpolation, Keyframe, Motion};
 use crate::flock::vectors::distance;
 use crate::geometry::point::minus;
 use crate::scene::swarm::raw::{RawCommandKind, RawSwarm};
-use crate::scene::swarm::{Leaders, Picked, Program, Swarm};
+use crate::scene::swarm::{Program, Swarm};
 use crate::scene::text::{decimals, number};
 use crate::swarm::flight::Flight;
 use crate::swarm::formation::{Formation, first_few};
@@ -240,8 +240,8 @@ fn fast_manoeuvres(raw: &RawSwarm, formation: &Formation) -> impl Iterator<Item 
 
 fn fast_paths(swarm: &Swarm, formation: &Formation) -> impl Iterator<Item = String> {
     let limit = swarm.raw.limits.speed.unwrap_or(f64::INFINITY);
-    swarm.leaders.iter().enumerate().filter_map(move |(k, leaders)| {
-        let fastest = motions(leaders, formation).map(speed).fold(0.0, f64::max);
+    (0..swarm.leaders.len()).filter_map(move |k| {
+        let fastest = motions(swarm, formation, k).map(speed).fold(0.0, f64::max);
         (fastest > limit * (1.0 + ROUNDING)).then(|| {
             format!(
                 "the program of leaders[{k}] moves a robot at up to {} m/s, above limits.speed: it will fall \
@@ -255,8 +255,8 @@ fn fast_paths(swarm: &Swarm, formation: &Formation) -> impl Iterator<Item = Stri
 /// Programs that leap from one point to the next.
 fn leaping_paths(swarm: &Swarm, formation: &Formation) -> impl Iterator<Item = String> {
     let reach = swarm.raw.limits.speed.unwrap_or(f64::INFINITY) * swarm.raw.control.period;
-    swarm.leaders.iter().enumerate().filter_map(move |(k, leaders)| {
-        let farthest = motions(leaders, formation).map(leap).fold(0.0, f64::max);
+    (0..swarm.leaders.len()).filter_map(move |k| {
+        let farthest = motions(swarm, formation, k).map(leap).fold(0.0, f64::max);
         (farthest > reach * (1.0 + ROUNDING)).then(|| {
             format!(
                 "the program of leaders[{k}] leaps by up to {} m, farther than limits.speed leads in a period: the robot \
@@ -267,15 +267,11 @@ fn leaping_paths(swarm: &Swarm, formation: &Formation) -> impl Iterator<Item = S
     })
 }
 
-/// Those of a program by points. One file may have rows for robots of other entries too.
-fn motions<'a>(leaders: &'a Leaders, formation: &Formation) -> impl Iterator<Item = &'a Motion> {
-    let is_led = |name: &String| match &leaders.robots {
-        Picked::Names(names) => names.contains(name),
-        Picked::Region(_) => {
-            formation.names.iter().position(|one| one == name).is_some_and(|m| formation.leads(m))
-        }
-    };
-    let (one, several) = match &leaders.program {
+/// Those by points in the program of an entry of leaders. One file may have rows for robots of other entries too.
+fn motions<'a>(swarm: &'a Swarm, formation: &Formation, entry: usize) -> impl Iterator<Item = &'a Motion> {
+    let number = |name: &String| formation.names.iter().position(|one| one == name);
+    let is_led = move |name: &String| number(name).and_then(|m| formation.entry(m)) == Some(entry);
+    let (one, several) = match &swarm.leaders[entry].program {
         Program::Motion(motion) => (Some(motion), &[][..]),
         Program::Individual(tracks) => (None, &tracks[..]),
         Program::External | Program::Manoeuvre(_) => (None, &[][..]),
