@@ -241,7 +241,7 @@ fn rows_for_robots_of_other_entries_are_no_reason_for_caution() {
         let text = format!("{robots}[[leaders]]\nrobots = [\"{robot}\"]\n{program}");
         plan_of(&Swarm::parse("t", "t.toml", &text, &[], Some(folder.path())).expect("valid"))
     };
-    assert!(cautions("b").iter().any(|one| one.contains("up to 5 m/s")), "{:?}", cautions("b"));
+    assert!(cautions("b").iter().any(|one| one.contains("up to 5.000 m/s")), "{:?}", cautions("b"));
     assert!(!cautions("a").iter().any(|one| one.contains("fall behind")), "{:?}", cautions("a"));
 }
 
