@@ -193,7 +193,7 @@ pub(super) fn require_damped(scene: &Scene, gradient: &GradientWeights) -> Resul
     Err(scene.refuse(
         "update.damping",
         message,
-        "leave update.damping out, or use update.order = \"sequential\"",
+        "leave update.damping out, use update.order = \"sequential\", or update.damping = 0.65",
     ))
 }
 

@@ -563,6 +563,7 @@ fn a_material_in_parts_is_refused_for_what_it_is_refused_for_as_a_whole() {
         ("there is no particle 5000", &[&slanted, "record={probes=[5000]}"]),
         ("is outside the body", &[&slanted, "record={places=[[12.0,4.0],[50.4,4.3]]}"]),
         ("like a hinge", &[&hinge[..]]),
+        ("like a hinge", &[&hinge, &weight, &at("")]),
         ("use a smaller spacing", &[&hinge, &weight, &at("")]),
         ("no leader holds", &[&weight, "roles=[]"]),
         ("at one particle only", &[&weight, one]),

@@ -253,14 +253,22 @@ fn robots_that_are_lost_for_a_period_at_a_time_come_no_nearer() {
     assert!(lost > 48, "{lost} were lost");
 }
 
+/// A swarm file of two, the second at `place` \[m\], which are led through each other until `at` \[s\].
+fn head_on(place: [f64; 2], at: f64, limits: &str, period: f64) -> String {
+    let far = place[0];
+    format!(
+        "title = \"two\"\nradius = 0.2\nlinks = {{ kind = \"nearest\", count = 1 }}\n\
+         robots = [{{ name = \"a\", place = [0.0, 0.0] }}, {{ name = \"b\", place = {place:?} }}]\n\
+         leaders = [{{ robots = [\"a\"], program = {{ kind = \"path\", points = [{{ at = {at:?}, displacement = [{far:?}, 0.0] }}] }} }}, \
+         {{ robots = [\"b\"], program = {{ kind = \"path\", points = [{{ at = {at:?}, displacement = [-{far:?}, 0.0] }}] }} }}]\n\
+         limits = {{ {limits} }}\ncontrol = {{ period = {period:?} }}\n"
+    )
+}
+
 /// Two that are led through each other at full speed, whose braking is as long as their way is known badly.
 #[test]
 fn noise_does_not_bring_robots_that_brake_nearer_than_declared_bit_by_bit() {
-    let two = "title = \"two\"\nradius = 0.2\nlinks = { kind = \"nearest\", count = 1 }\n\
-               robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [4.0, 0.1] }]\n\
-               leaders = [{ robots = [\"a\"], program = { kind = \"path\", points = [{ at = 6.0, displacement = [4.0, 0.0] }] } }, \
-               { robots = [\"b\"], program = { kind = \"path\", points = [{ at = 6.0, displacement = [-4.0, 0.0] }] } }]\n\
-               limits = { speed = 2.0, acceleration = 1.0, clearance = 0.1 }\ncontrol = { period = 0.02 }\n";
+    let two = head_on([4.0, 0.1], 6.0, "speed = 2.0, acceleration = 1.0, clearance = 0.1", 0.02);
     for (noise, delay, seed) in [0.001, 0.01, 0.03].into_iter().flat_map(|noise| {
         [0, 1, 2, 5].into_iter().flat_map(move |delay| (0..4).map(move |seed| (noise, delay, seed)))
     }) {
@@ -268,7 +276,7 @@ fn noise_does_not_bring_robots_that_brake_nearer_than_declared_bit_by_bit() {
             "flight={{ duration = 20.0, model = {DOUBLE}, noise = {noise}, delay = {delay}, seed = {seed} }}"
         );
         let swarm =
-            Swarm::parse("two", "two.toml", two, &[flight], None).unwrap_or_else(|error| panic!("{error}"));
+            Swarm::parse("two", "two.toml", &two, &[flight], None).unwrap_or_else(|error| panic!("{error}"));
         let (_, report) = fly(&swarm, &mut |_, _| ControlFlow::Continue(())).expect("flies");
         let clearance = report.clearance.expect("two robots");
         assert!(clearance >= 0.1 - ROUNDING, "noise {noise}, delay {delay}, seed {seed}: {clearance}");
@@ -279,11 +287,7 @@ fn noise_does_not_bring_robots_that_brake_nearer_than_declared_bit_by_bit() {
 /// The largest acceleration is one way to write that there is no limit: robots keep clear, and come to where they are led.
 #[test]
 fn an_acceleration_limit_beyond_all_robots_is_none() {
-    let two = "title = \"two\"\nradius = 0.2\nlinks = { kind = \"nearest\", count = 1 }\n\
-               robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [3.0, 0.0] }]\n\
-               leaders = [{ robots = [\"a\"], program = { kind = \"path\", points = [{ at = 3.0, displacement = [3.0, 0.0] }] } }, \
-               { robots = [\"b\"], program = { kind = \"path\", points = [{ at = 3.0, displacement = [-3.0, 0.0] }] } }]\n\
-               limits = { speed = 1.0, clearance = 0.1 }\ncontrol = { period = 0.1 }\n";
+    let two = head_on([3.0, 0.0], 3.0, "speed = 1.0, clearance = 0.1", 0.1);
     for (model, most) in
         [SINGLE, IDEAL].into_iter().flat_map(|model| [1e9, 1e17, 1e300].map(|most| (model, most)))
     {
@@ -292,7 +296,7 @@ fn an_acceleration_limit_beyond_all_robots_is_none() {
             format!("limits.acceleration={most:e}"),
         ];
         let swarm =
-            Swarm::parse("two", "two.toml", two, &set, None).unwrap_or_else(|error| panic!("{error}"));
+            Swarm::parse("two", "two.toml", &two, &set, None).unwrap_or_else(|error| panic!("{error}"));
         let (_, report) = fly(&swarm, &mut |_, _| ControlFlow::Continue(())).expect("flies");
         let clearance = report.clearance.expect("two robots");
         assert!(clearance >= 0.1 - ROUNDING, "{model}, {most}: {clearance}");
