@@ -10,7 +10,7 @@ use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use crate::engine::Engine;
+use crate::engine::actions::Stressed;
 use crate::flock::body::Body;
 use crate::flock::rules::Rotation;
 use crate::flock::vectors::{Vectors, distance};
@@ -234,24 +234,22 @@ fn around([x, y]: [i64; 2]) -> impl Iterator<Item = [i64; 2]> {
 /// The particles whose stress is recovered from that of the cells, and it. Of a body that turns all of it is taken in axes
 /// that turn with it, in which a stress is in equilibrium but for terms of the size of the strain.
 pub(super) fn recovered(
-    engine: &Engine,
-    elastic: &Elastic,
+    body: &Body,
+    &Stressed { cells, elastic, rotation, edge, load }: &Stressed<'_>,
     of_cells: &[StressState],
-    (displacement, rotation): (&Vectors, Rotation),
+    displacement: &Vectors,
 ) -> Vec<(usize, StressState)> {
-    let (Some(edge), Some(cells)) = (engine.free_edge(), engine.cells()) else { return Vec::new() };
-    let patches = Patches::new(edge, engine.body(), cells);
-    // A body that has not moved yet bears nothing.
-    let factor = if engine.has_moved() { engine.load_factor() } else { 0.0 };
+    let Some(edge) = edge else { return Vec::new() };
+    let patches = Patches::new(edge, body, cells);
     let turns: Option<Vec<f64>> = (rotation == Rotation::Corotated)
         .then(|| stress::turns(cells, 0..cells.count(), displacement).collect());
     let turn = |cell: u32| turns.as_ref().map_or(0.0, |turns| turns[cell as usize]);
     let fields: Vec<Fields> = std::iter::once(elastic).chain(&cells.inclusions).map(Fields::of).collect();
     let recover = |&i: &usize| {
         let patch = patches.of(i).ok()?;
-        let point = engine.body().reference.get(i);
+        let point = body.reference.get(i);
         let turned = patch.cells.iter().map(|&cell| turn(cell)).sum::<f64>() / patch.cells.len() as f64;
-        let balancing = Balancing { point, force: turned_back(edge.body_force.map(|f| factor * f), turned) };
+        let balancing = Balancing { point, force: turned_back(edge.body_force.map(|f| load * f), turned) };
         let cells_here: Vec<CellStress> = patch
             .cells
             .iter()
@@ -270,7 +268,7 @@ pub(super) fn recovered(
                 let direction = turned_back(known.direction, turn(edge.cells[n as usize]));
                 let [off_x, off_y, _] = balancing.at(known.point);
                 let off = direction[0] * known.normal[0] * off_x + direction[1] * known.normal[1] * off_y;
-                KnownTraction { value: factor * known.value - off, direction, ..*known }
+                KnownTraction { value: load * known.value - off, direction, ..*known }
             })
             .collect();
         let fields = &fields[patch.region as usize];

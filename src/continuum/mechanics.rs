@@ -6,6 +6,7 @@ use super::edge_stress::{self, recovered};
 use super::pieces::CellNumbers;
 use super::run::growth;
 use crate::engine::Engine;
+use crate::engine::actions::Stressed;
 use crate::engine::forces::{Forces, LoadResultant, Reaction};
 use crate::engine::path::{Path, Work};
 use crate::flock::body::Body;
@@ -81,12 +82,15 @@ impl Stresses {
     /// At a step that has been taken, under these displacements \[length\], these pairs of particles being parted; `None`
     /// without a material.
     pub fn of(engine: &Engine, step: usize, displacement: &Vectors, broken: &[[u32; 2]]) -> Option<Self> {
-        let (cells, elastic) = (engine.cells()?, engine.elastic_at(step)?);
-        let torn = torn(cells, displacement.len(), broken);
-        let of_cells = of_whole_cells(engine, (cells, &torn), elastic, displacement);
-        let mut particles = AroundParticles::new(cells, elastic, &of_cells, displacement.len()).all_larger();
+        Self::by(engine, &engine.stressed_at(step)?, displacement, broken)
+    }
+
+    fn by(engine: &Engine, by: &Stressed<'_>, displacement: &Vectors, broken: &[[u32; 2]]) -> Option<Self> {
+        let of_cells = of_whole_cells(by, displacement, broken);
+        let around = AroundParticles::new(by.cells, by.elastic, &of_cells, displacement.len());
+        let mut particles = around.all_larger();
         let recovered = match broken {
-            [] => recovered(engine, elastic, &of_cells, (displacement, rotation(engine))),
+            [] => recovered(engine.body(), by, &of_cells, displacement),
             _ => Vec::new(),
         };
         for &(i, stress) in &recovered {
@@ -103,22 +107,21 @@ impl Stresses {
         displacement: &Vectors,
         broken: &[[u32; 2]],
     ) -> Vec<StressState> {
-        let (Some(cells), Some(elastic)) = (engine.cells(), engine.elastic_at(step)) else {
-            return Vec::new();
-        };
-        let torn = torn(cells, displacement.len(), broken);
-        of_whole_cells(engine, (cells, &torn), elastic, displacement)
+        engine.stressed_at(step).map_or_else(Vec::new, |by| of_whole_cells(&by, displacement, broken))
     }
 
     /// At the engine's present places; of a scene without a material nothing is laid out to find that it has none.
     pub fn at_present(engine: &Engine) -> Option<Self> {
         engine.cells()?;
-        Self::under(engine, &engine.displacements())
+        Self::of(engine, engine.step(), &engine.displacements(), &parted(engine))
     }
 
-    /// At present, under other displacements \[length\].
-    pub fn under(engine: &Engine, displacement: &Vectors) -> Option<Self> {
-        Self::of(engine, engine.step(), displacement, &parted(engine))
+    /// At present, under a part of displacements and loads alike.
+    pub fn under_part(engine: &Engine, part: f64) -> Option<Self> {
+        let by = engine.stressed_at(engine.step())?;
+        let mut displacement = engine.displacements();
+        displacement.x.iter_mut().chain(&mut displacement.y).for_each(|u| *u *= part);
+        Self::by(engine, &Stressed { load: part * by.load, ..by }, &displacement, &parted(engine))
     }
 
     /// The von Mises stress around each particle at present \[force / length^2\], shape \[count\]: that of
@@ -206,14 +209,10 @@ pub(crate) fn here(body: &Body, pairs: impl Iterator<Item = [u32; 2]>) -> Vec<[u
 }
 
 /// The stress of each cell, NaN in those that are torn.
-fn of_whole_cells(
-    engine: &Engine,
-    (cells, torn): (&Cells, &[bool]),
-    elastic: &Elastic,
-    displacement: &Vectors,
-) -> Vec<StressState> {
-    let mut of_cells = stress::of_cells(cells, elastic, displacement, rotation(engine));
-    for (stress, _) in of_cells.iter_mut().zip(torn).filter(|(_, torn)| **torn) {
+fn of_whole_cells(by: &Stressed<'_>, displacement: &Vectors, broken: &[[u32; 2]]) -> Vec<StressState> {
+    let torn = torn(by.cells, displacement.len(), broken);
+    let mut of_cells = stress::of_cells(by.cells, by.elastic, displacement, by.rotation);
+    for (stress, _) in of_cells.iter_mut().zip(torn).filter(|(_, torn)| *torn) {
         let components = [f64::NAN; 3];
         *stress = StressState { strain: components, components, across: f64::NAN, von_mises: f64::NAN };
     }
@@ -354,10 +353,7 @@ fn strain_energy(engine: &Engine, elastic: &Elastic, forces: Option<&Forces>, u:
 
 /// Which turns of a cell are no strain.
 fn rotation(engine: &Engine) -> Rotation {
-    match engine.flock().rule.mean {
-        Mean::Material { rotation } => rotation,
-        _ => Rotation::Small,
-    }
+    engine.flock().rule.mean.rotation()
 }
 
 /// Whether two corners of each cell are parted.

@@ -12,11 +12,35 @@ use crate::flock::action::ActionKind;
 use crate::flock::fracture::Bonds;
 use crate::flock::law::Flock;
 use crate::flock::motion::Motion;
+use crate::flock::rules::{Mean, Rotation};
 use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
-use crate::material::free_edge::FreeEdge;
+use crate::material::free_edge::{Edge, FreeEdge};
 use crate::sweep::Update;
+
+/// The body as a solid, before an action changes it.
+#[derive(Clone, Debug)]
+pub(super) struct Solid {
+    mean: Mean,
+    cells: Option<Cells>,
+    elastic: Option<Elastic>,
+    free_edge: Option<Arc<FreeEdge>>,
+}
+
+/// What stress at a step is found by, beside the places at that step.
+pub(crate) struct Stressed<'a> {
+    /// Between the particles.
+    pub cells: &'a Cells,
+    /// The material, inclusions left aside.
+    pub elastic: &'a Elastic,
+    /// The turns that are no strain.
+    pub rotation: Rotation,
+    /// The known tractions along the outline, where stress can be recovered from it.
+    pub edge: Option<&'a Edge>,
+    /// Part of the loads that is on the body \[1\].
+    pub load: f64,
+}
 
 impl Conduct {
     /// That of a body before its first step.
@@ -89,6 +113,13 @@ impl Engine {
             free_edge,
         } = conduct.clone();
         let flock = &mut self.flock;
+        let before = Solid {
+            mean: flock.rule.mean,
+            cells: std::mem::replace(&mut self.cells, cells),
+            elastic: std::mem::replace(&mut self.elastic, elastic),
+            free_edge: std::mem::replace(&mut self.free_edge, free_edge),
+        };
+        self.first.get_or_insert(before);
         (flock.rule, flock.weights, flock.forces) = (rule, weights, forces);
         (flock.rest, flock.keeps_rest) = (rest, keeps_rest);
         match (&mut flock.bonds, fracture) {
@@ -100,7 +131,7 @@ impl Engine {
             }
             (None, None) => {}
         }
-        (self.update, self.cells, self.elastic, self.free_edge) = (update, cells, elastic, free_edge);
+        self.update = update;
         let factor = self.load_factor();
         self.load = Load::new(self.load.ramp(), loads);
         self.set_load_factor(factor);
@@ -123,11 +154,24 @@ impl Engine {
         }
     }
 
-    /// The material at a step that has been taken.
-    pub(crate) fn elastic_at(&self, step: usize) -> Option<&Elastic> {
-        let planned = self.planned_conduct(step).map(|conduct| &conduct.elastic);
+    /// What its stress at a step that has been taken is found by; `None` without a material.
+    pub(crate) fn stressed_at(&self, step: usize) -> Option<Stressed<'_>> {
+        let now = (self.flock.rule.mean, &self.cells, &self.elastic, &self.free_edge);
         let is_now = step == self.step || self.planned_conduct(self.step).is_none();
-        if is_now { &self.elastic } else { planned.unwrap_or(&self.first_elastic) }.as_ref()
+        let (mean, cells, elastic, free_edge) = match (self.planned_conduct(step), &self.first) {
+            _ if is_now => now,
+            (Some(then), _) => (then.rule.mean, &then.cells, &then.elastic, &then.free_edge),
+            (None, Some(first)) => (first.mean, &first.cells, &first.elastic, &first.free_edge),
+            (None, None) => now,
+        };
+        let cells = cells.as_ref()?;
+        Some(Stressed {
+            cells,
+            elastic: elastic.as_ref()?,
+            rotation: mean.rotation(),
+            edge: free_edge.as_ref().and_then(|edge| edge.of(&self.body, cells)),
+            load: self.load_factor_at(step),
+        })
     }
 
     /// Adds a role that particles take at a step to come, and returns its number among the changes.

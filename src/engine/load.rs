@@ -9,6 +9,8 @@ pub(super) struct Load {
     /// Steps over which the loads grow, where they do.
     ramp: Option<usize>,
     factor: f64,
+    /// Of each equilibrium so far, where the body is put to rest part by part.
+    parts: Vec<f64>,
     /// The whole of each load \[force\], shape \[loads\]\[count\].
     each: Vec<Vectors>,
     /// \[force\], shape \[count\]; only where the factor has been another than 1.
@@ -17,7 +19,7 @@ pub(super) struct Load {
 
 impl Load {
     pub fn new(ramp: Option<usize>, each: Vec<Vectors>) -> Self {
-        Self { ramp, factor: 1.0, each, whole: None }
+        Self { ramp, factor: 1.0, parts: Vec::new(), each, whole: None }
     }
 
     pub fn ramp(&self) -> Option<usize> {
@@ -34,6 +36,22 @@ impl Engine {
     /// Part of the scene's loads that is on the body now \[1\].
     pub(crate) fn load_factor(&self) -> f64 {
         self.load.factor
+    }
+
+    /// The same at a step that has been taken: a body that has not moved yet bears nothing.
+    pub(super) fn load_factor_at(&self, step: usize) -> f64 {
+        match (step, self.load.ramp) {
+            _ if step == self.step => {
+                if self.has_moved() {
+                    self.load.factor
+                } else {
+                    0.0
+                }
+            }
+            (0, _) => 0.0,
+            (_, Some(ramp)) => (step as f64 / ramp as f64).min(1.0),
+            _ => self.load.parts.get(step - 1).copied().unwrap_or(1.0),
+        }
     }
 
     /// All of the scene's loads \[force\], shape \[count\]; `None` without loads.
@@ -56,6 +74,12 @@ impl Engine {
             let whole = self.load.whole.get_or_insert_with(|| forces.clone());
             *forces = scaled(whole, factor);
         }
+    }
+
+    /// Puts this part of the loads on a body that rests under it after those before \[1\].
+    pub(crate) fn set_load_part(&mut self, part: f64) {
+        self.load.parts.push(part);
+        self.set_load_factor(part);
     }
 
     /// Brings the loads to what they are at this step, where they grow.

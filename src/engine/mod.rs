@@ -7,7 +7,7 @@
 //! that is a material, and what holds it; [`path`] sums up the work done between equilibria. [`state`] takes an engine
 //! out on its way and puts it back, for checkpoints; `undo` takes a step back that diverged.
 
-mod actions;
+pub(crate) mod actions;
 pub mod forces;
 mod leaders;
 pub mod load;
@@ -41,6 +41,7 @@ use crate::material::free_edge::{Edge, FreeEdge};
 use crate::ranks::Team;
 use crate::sweep::domain::Share;
 use crate::sweep::{Activity, Order, Sweep, Update};
+use actions::Solid;
 use leaders::Led;
 use load::Load;
 use movement::Movement;
@@ -84,9 +85,10 @@ pub struct Engine {
     step: usize,
     /// Between the particles, where the scene has a material.
     cells: Option<Cells>,
-    /// The material, inclusions left aside: before the first step, and now.
-    first_elastic: Option<Elastic>,
+    /// The material as it is now, inclusions left aside.
     elastic: Option<Elastic>,
+    /// The body as a solid before the first step, once an action has changed it.
+    first: Option<Solid>,
     free_edge: Option<Arc<FreeEdge>>,
     load: Load,
     /// Displacements of a body that was put to rest \[length\]; positions have lost their last digits.
@@ -159,8 +161,8 @@ impl Engine {
             activity: Activity::default(),
             step: 0,
             cells,
-            first_elastic: elastic,
             elastic,
+            first: None,
             free_edge,
             load: Load::new(ramp, loads),
             settled: None,

@@ -94,6 +94,7 @@ use crate::continuum::mechanics::{Stresses, here};
 use crate::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use crate::continuum::run::Outcome;
 use crate::engine::Engine;
+use crate::flock::rules::Rotation;
 use crate::ranks::Team;
 use crate::scene::Scene;
 use crate::scene::units::Units;
@@ -142,7 +143,7 @@ impl Drawn {
     /// has to be one that is drawn as squares ([`figures::is_raster`]).
     pub fn of(scene: &Scene, engine: &Engine) -> Vec<Self> {
         let (snapshot, subject, units) = (Snapshot::of(engine), Subject::of(scene, engine), Units::of(scene));
-        let figures = figures_of_snapshot((scene, engine), &subject, &units, &snapshot);
+        let figures = figures_of_snapshot(engine, &subject, &units, &snapshot);
         let is_first = engine.parted().is_none_or(Team::is_first);
         let kept = |svg| if is_first { svg } else { String::new() };
         let figures = figures.into_iter();
@@ -291,7 +292,7 @@ fn draw_all(
 /// The figures of a configuration. Stresses are found while each of those that show them is drawn, and are there neither before
 /// nor after.
 fn figures_of_snapshot<'a>(
-    (scene, engine): (&'a Scene, &'a Engine),
+    engine: &'a Engine,
     subject: &'a Subject<'_>,
     units: &'a Units,
     snapshot: &'a Snapshot,
@@ -304,6 +305,7 @@ fn figures_of_snapshot<'a>(
     let Some(cells) = engine.cells() else { return figures };
     let parted = move || here(engine.body(), snapshot.broken.iter().copied());
     let displacement = move || figures::displacement(subject, snapshot);
+    let rotation = engine.stressed_at(snapshot.step).map_or(Rotation::Small, |by| by.rotation);
     let unit = units.stress.as_str();
     let in_cells = move || Stresses::in_cells(engine, snapshot.step, &displacement(), &parted());
     let von_mises = move || {
@@ -315,8 +317,7 @@ fn figures_of_snapshot<'a>(
         let of_cells = || Stresses { cells: in_cells(), particles: Vec::new(), recovered: Vec::new() };
         figures::stress(subject, snapshot, cells, &found.unwrap_or_else(of_cells), unit)
     };
-    let components =
-        move || figures::components(subject, snapshot, (cells, scene.rotation()), &in_cells(), unit);
+    let components = move || figures::components(subject, snapshot, (cells, rotation), &in_cells(), unit);
     figures.push((name("von_mises"), Box::new(von_mises)));
     figures.push((name("stress"), Box::new(components)));
     figures
@@ -325,9 +326,8 @@ fn figures_of_snapshot<'a>(
 fn figures_of<'a>(results: &'a Results<'_>, subject: &'a Subject<'_>, units: &'a Units) -> Vec<Figure<'a>> {
     let Results { scene, outcome, snapshots, drawn, probes, load_steps, .. } = *results;
     let already = |one: &'a Drawn| -> Figure<'a> { (one.name.clone(), Box::new(|| one.svg.clone())) };
-    let to_draw = snapshots
-        .iter()
-        .flat_map(|snapshot| figures_of_snapshot((scene, &outcome.engine), subject, units, snapshot));
+    let to_draw =
+        snapshots.iter().flat_map(|snapshot| figures_of_snapshot(&outcome.engine, subject, units, snapshot));
     let mut figures: Vec<Figure<'a>> = drawn.iter().map(already).chain(to_draw).collect();
     if !probes.is_empty() {
         figures.push(("probes".into(), Box::new(move || figures::probes(subject, probes))));

@@ -130,10 +130,7 @@ impl Scene {
 
     /// Which turns of the body are no strain.
     pub fn rotation(&self) -> Rotation {
-        match self.mean {
-            Mean::Material { rotation } => rotation,
-            _ => Rotation::Small,
-        }
+        self.mean.rotation()
     }
 
     /// Whether the body was given as points instead of cut from a lattice.

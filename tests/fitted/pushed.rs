@@ -1,9 +1,14 @@
 //! Stress where forces act on single particles, after a material has changed, and before anything has moved.
 
+use std::ops::ControlFlow;
+
+use flockform::continuum::equilibrium::run_to_equilibrium_watched;
 use flockform::continuum::mechanics::{Mechanics, Stresses};
 use flockform::continuum::plan::Plan;
 use flockform::continuum::record::LoadStep;
 use flockform::engine::Engine;
+use flockform::engine::observer::EachStep;
+use flockform::flock::vectors::Vectors;
 use flockform::scene::Scene;
 
 use crate::support::{lattice, scene, solved};
@@ -75,6 +80,78 @@ fn stress_is_that_of_the_material_as_an_action_leaves_it() {
         let (displacement, then) = before.expect("stepped");
         let pictured = Stresses::of(&changed, 5, &displacement, &[]).expect("has cells");
         assert_eq!(pictured.cells, then.cells, "{key}");
+    }
+}
+
+/// What stress at a step was found to be then, and is once the run has ended.
+fn require_the_same_afterwards(what: &str, seen: &[(usize, Vectors, Stresses)], end: &Engine) {
+    assert!(seen.len() > 1, "{what}");
+    for (step, displacement, then) in seen {
+        let pictured = Stresses::of(end, *step, displacement, &[]).expect("has cells");
+        assert_eq!(pictured.recovered, then.recovered, "{what}, step {step}");
+        assert_eq!(
+            (pictured.cells, pictured.particles),
+            (then.cells.clone(), then.particles.clone()),
+            "{what}, step {step}"
+        );
+    }
+}
+
+fn see(engine: &Engine) -> (usize, Vectors, Stresses) {
+    (engine.step(), engine.displacements(), Stresses::at_present(engine).expect("has cells"))
+}
+
+/// Along the edges it is found by what pulls there, of which there may be more or less later.
+#[test]
+fn a_picture_of_an_earlier_step_is_one_of_what_acted_then() {
+    let set = |key: &str| format!("{{ at = 10, what = {{ kind = \"set\", keys = [\"{key}\"] }} }}");
+    let cases = [
+        set("loads[0].traction=[0.25, 0.5]"),
+        set("rule.mean.rotation=corotated"),
+        set("material.young=2000.0"),
+        String::new(),
+    ];
+    for actions in cases {
+        let mut scene = stepped(&actions, 0.3);
+        if actions.is_empty() {
+            let ramp = scene.with(&["load_steps.ramp={steps=15}".to_owned()], None);
+            scene = ramp.unwrap_or_else(|error| panic!("{error}"));
+        }
+        let mut engine = engine(&scene);
+        let mut seen = vec![see(&engine)];
+        for step in 1..=20 {
+            engine.advance();
+            if [5, 9, 10, 20].contains(&step) {
+                seen.push(see(&engine));
+            }
+        }
+        assert_ne!(seen[1].2.particles, seen[4].2.particles, "{actions}");
+        require_the_same_afterwards(&actions, &seen, &engine);
+    }
+}
+
+#[test]
+fn a_picture_of_an_increment_is_one_of_its_part_of_the_load() {
+    let material = "material = { kind = \"isotropic\", young = 1000.0, poisson = 0.3 }";
+    let pull =
+        "{ kind = \"traction\", region = { kind = \"edge\", side = \"right\" }, traction = [1.0, 0.0] }";
+    let parts = format!(
+        "{material}\n{BAR}\n{CLAMP}\nloads = [{pull}]\nload_steps = {{ schedule = [0.25, 1.0, 0.0] }}"
+    );
+    let scene = scene(&lattice("square", 1.0, 0.0), &parts).unwrap_or_else(|error| panic!("{error}"));
+    let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
+    let mut seen = Vec::new();
+    let mut each = |engine: &Engine, _: f64| {
+        seen.push(see(engine));
+        ControlFlow::Continue(())
+    };
+    let outcome = run_to_equilibrium_watched(&scene, plan, &mut EachStep(&mut each))
+        .unwrap_or_else(|error| panic!("{error}"));
+    require_the_same_afterwards("increments", &seen, &outcome.engine);
+    for (step, part) in [(0, 0.0), (1, 0.25), (2, 1.0), (3, 0.0)] {
+        // A bar that is pulled has the same stress everywhere.
+        let all = seen[step].2.particles.iter().flatten();
+        assert!(all.into_iter().all(|stress| (stress.components[0] - part).abs() < 1e-6), "increment {step}");
     }
 }
 

@@ -60,7 +60,7 @@ pub(super) fn settle_each(
             }
         };
         outcome.engine.place_at_rest(n + 1, &solved.displacement);
-        outcome.engine.set_load_factor(part);
+        outcome.engine.set_load_part(part);
         outcome.engine.extend_path();
         outcome.engine.record_probes();
         outcome.residual = farthest_from_target(&outcome.engine) / spacing;

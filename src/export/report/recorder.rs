@@ -22,7 +22,7 @@ use crate::export::figures::displaced;
 use crate::flock::action::ActionKind;
 use crate::flock::pseudo_energy::pe1;
 use crate::flock::role::Role;
-use crate::flock::rules::{Mean, Rotation};
+use crate::flock::rules::Rotation;
 use crate::flock::strain::{Strain, strain};
 use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
@@ -418,12 +418,10 @@ fn roles<'a>(engine: &'a Engine, sample: Option<&Sample>) -> Cow<'a, [Role]> {
     sample.map_or(Cow::Borrowed(engine.roles()), |sample| Cow::Owned(of_sample(sample)))
 }
 
-/// The von Mises stress around each particle \[force / length^2\] under a part of the displacements, shape \[count\]; NaN where
+/// The von Mises stress around each particle \[force / length^2\] under a part of displacements and loads, shape \[count\]; NaN where
 /// there is none.
 fn von_mises(engine: &Engine, part: f64) -> Vec<f64> {
-    let mut displacement = engine.displacements();
-    displacement.x.iter_mut().chain(&mut displacement.y).for_each(|u| *u *= part);
-    let particles = Stresses::under(engine, &displacement).map(|stresses| stresses.particles);
+    let particles = Stresses::under_part(engine, part).map(|stresses| stresses.particles);
     let of = |stress: Option<StressState>| stress.map_or(f64::NAN, |stress| stress.von_mises);
     particles.map_or_else(Vec::new, |particles| particles.into_iter().map(of).collect())
 }
@@ -463,16 +461,12 @@ pub(in crate::export) fn is_linear(scene: &Scene) -> bool {
     scene.material.is_some() && scene.mean.is_affine() && scene.fracture.is_none()
 }
 
-/// Whether stress is that of cells turned back first.
-fn turns(scene: &Scene) -> bool {
-    matches!(scene.mean, Mean::Material { rotation: Rotation::Corotated })
-}
-
 /// What the page computes stress of steps by; nothing where there are several materials, at a time or one after the other, or cells
 /// do not have their stress by themselves.
 fn stress(scene: &Scene) -> Option<Stress> {
     let elastic = scene.material?;
-    let stays = |then: &Scene| then.material == scene.material && then.inclusions == scene.inclusions;
+    let of = |scene: &Scene| (scene.material, scene.rotation());
+    let stays = |then: &Scene| of(then) == of(scene) && then.inclusions == scene.inclusions;
     let mut actions = scene.actions.iter();
     let is_one = actions.all(|action| !matches!(&action.what, ActionKind::Follow(then) if !stays(then)));
     if !is_one || !scene.inclusions.is_empty() || elastic.averaged_dilatation().is_some() {
@@ -485,7 +479,7 @@ fn stress(scene: &Scene) -> Option<Stress> {
         _ => 0.0,
     };
     let stiffness = [0, 1, 2].map(|row| [0, 1, 2].map(|k| columns[k][row]));
-    Some(Stress { stiffness, across, turns: turns(scene) })
+    Some(Stress { stiffness, across, turns: scene.rotation() == Rotation::Corotated })
 }
 
 /// Every bond with the step at which it broke; a bond without one lives.

@@ -104,6 +104,14 @@ pub enum Mean {
 }
 
 impl Mean {
+    /// Which turns of the surroundings are no strain.
+    pub(crate) fn rotation(&self) -> Rotation {
+        match self {
+            Mean::Material { rotation } => *rotation,
+            _ => Rotation::Small,
+        }
+    }
+
     /// Whether its targets are affine in the neighbours' positions, by weights that do not change.
     pub(crate) fn is_affine(&self) -> bool {
         matches!(self, Mean::Barycentre | Mean::Material { rotation: Rotation::Small })
