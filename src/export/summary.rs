@@ -184,9 +184,9 @@ pub struct FirstBreak {
 pub struct Measured {
     /// Units of the numbers, by name.
     pub units: Units,
-    /// Whether a solver found an equilibrium: what then is unbalanced is what its tolerance and rounding leave.
+    /// Why forces may be left on followers.
     #[serde(skip)]
-    pub is_settled: bool,
+    pub why_unbalanced: &'static str,
     /// Whether stresses are in axes that turn with the material.
     #[serde(skip)]
     pub is_corotated: bool,
@@ -235,11 +235,18 @@ impl Summary {
         let engine = &outcome.engine;
         let [pe1, pe2] = engine.energies();
         let largest_strain = largest_strain(engine);
-        let is_slow = outcome.reason == StopReason::Equilibrium && outcome.solved.is_none();
-        let settled = measured.as_ref().filter(|_| is_slow);
+        let is_tied = ties_to_reference(scene);
+        let may_be_short = outcome.reason == StopReason::Equilibrium && (outcome.solved.is_none() || is_tied);
+        let settled = measured.as_ref().filter(|_| may_be_short);
         let left = settled.and_then(|settled| settled.mechanics.short_of_rest(engine));
-        let short_of_rest = left.map(|left| {
+        let balance = left.map(|left| {
             let of = if engine.whole_load().is_some() { "loads" } else { "reactions" };
+            if is_tied {
+                return format!(
+                    "feedback from the initial place ties each particle to it: at rest, {} of the {of} are not in balance",
+                    percent(left)
+                );
+            }
             format!(
                 "nothing moves farther in a step than stop.tolerance, but {} of the {of} are not in balance yet: lower \
                  stop.tolerance",
@@ -260,8 +267,8 @@ impl Summary {
             share_swept: outcome.solved.is_none().then(|| outcome.engine.activity().share_computed()),
             equilibrium: outcome.solved.as_ref().map(Equilibrium::of),
             energies: Energies { pe1, pe2, largest_strain },
-            is_short_of_rest: short_of_rest.is_some(),
-            cautions: [short_of_rest, of_contrast(scene, &outcome.reason)]
+            is_short_of_rest: balance.is_some() && !is_tied,
+            cautions: [balance, of_contrast(scene, &outcome.reason)]
                 .into_iter()
                 .flatten()
                 .chain(cautions(scene, engine, measured.as_ref()))
@@ -305,6 +312,11 @@ fn cautions(scene: &Scene, engine: &Engine, measured: Option<&Measured>) -> Vec<
         .collect()
 }
 
+/// Whether feedback holds particles by more than their material.
+fn ties_to_reference(scene: &Scene) -> bool {
+    scene.feedback.is_some_and(|feedback| feedback.ties_to_reference())
+}
+
 /// The likely cause of a solve that ended short of its tolerance, where a body is of several materials.
 fn of_contrast(scene: &Scene, reason: &StopReason) -> Option<String> {
     let all = scene.material.iter().chain(scene.inclusions.iter().map(|part| &part.material));
@@ -326,15 +338,19 @@ impl Measured {
         let stresses = Stresses::at_present(engine)?;
         let mechanics = Mechanics::under(&stresses, engine)?;
         let places = at_places(scene, engine, &stresses);
-        let is_settled = outcome.solved.as_ref().is_some_and(Solved::is_at_rest);
-        let is_corotated = scene.rotation() == Rotation::Corotated;
-        Some((Self { units: Units::of(scene), is_settled, is_corotated, mechanics, places }, stresses))
+        let why_unbalanced = match &outcome.solved {
+            _ if ties_to_reference(scene) => "what feedback from the initial place holds",
+            Some(solved) if solved.is_at_rest() => "what tolerance and rounding leave",
+            _ => "not at rest",
+        };
+        let is_corotated = engine.flock().rule.mean.rotation() == Rotation::Corotated;
+        Some((Self { units: Units::of(scene), why_unbalanced, is_corotated, mechanics, places }, stresses))
     }
 }
 
 impl fmt::Display for Measured {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { units, is_settled, is_corotated, mechanics, places } = self;
+        let Self { units, why_unbalanced, is_corotated, mechanics, places } = self;
         let (force, moment, length) = (&units.force, &units.moment, &units.length);
         // Rounding of the larger component is no number of the smaller one.
         let shown = |value: f64, beside: f64| if value.abs() < 1e-9 * beside.abs() { 0.0 } else { value };
@@ -373,8 +389,11 @@ impl fmt::Display for Measured {
         let sizes = sizes.chain(mechanics.load.map(|load| load.force)).map(|[x, y]| x.hypot(y));
         let largest = sizes.fold(0.0, f64::max);
         if let Some(left) = mechanics.unbalanced.filter(|left| *left > AT_REST * largest) {
-            let why = if *is_settled { "what tolerance and rounding leave" } else { "not at rest" };
-            writeln!(f, "{why}: an unbalanced force of {} {force} acts on a follower", short(left))?;
+            writeln!(
+                f,
+                "{why_unbalanced}: an unbalanced force of {} {force} acts on a follower",
+                short(left)
+            )?;
         }
         if let Some(Peak { von_mises, cell, place, particles }) = &mechanics.largest_von_mises {
             let stress = &units.stress;

@@ -25,6 +25,11 @@ pub struct Feedback {
 }
 
 impl Feedback {
+    /// Whether it ties each particle to its place in the reference configuration, beside what the mean asks for.
+    pub fn ties_to_reference(&self) -> bool {
+        self.reference == FeedbackReference::Initial && self.factor != 0.0
+    }
+
     /// Moves the target past itself.
     pub fn overshoot(&self, own: &ParticleState, target: &mut [f64; 2]) {
         let from = match self.reference {

@@ -97,6 +97,11 @@ fn check(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
         (present.then(|| "neighbours".to_owned()), "neighbours found anew at every step"),
         (broken.then(|| if raw.cuts.is_empty() { "fracture" } else { "cuts" }.to_owned()), "breaking bonds"),
     ];
+    if raw.rule.feedback.as_ref().is_some_and(|feedback| feedback.factor == -1.0) {
+        let message = "takes back all that the mean asks for: no follower ever moves, and there is nothing to solve for";
+        let help = "give a factor above -1, or leave [equilibrium] out to step";
+        return Err(refuse("rule.feedback.factor", message.into(), help));
+    }
     match clash.into_iter().find_map(|(key, what)| key.map(|key| (key, what))) {
         None => Ok(()),
         Some((key, what)) => Err(refuse(
