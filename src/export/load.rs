@@ -6,13 +6,13 @@
 //! | `factor` | part of the loads that is on the body \[1\] |
 //! | `load.fx`, `load.fy`, `load.moment` | resultant of the loads, and its moment about the origin |
 //! | `load.displacement` | mean displacement along the resultant, weighted by the loads; empty where they cancel |
-//! | `loads[k].fx`, ... | the same of each load by itself, where there are several |
+//! | `loads[k].fx`, ... | the same of each load by itself, where there are several; an action that sets `loads` counts anew |
 //! | `roles[k].ux`, `.uy` | mean displacement of what the entry of `roles` holds |
 //! | `roles[k].fx`, `.fy`, `.moment` | its reaction, and the moment of that about the region's middle at rest |
 //! | `work.loads`, `work.supports` | done since the unloaded body, by the trapezoid rule; empty where steps are swept |
 //! | `strain_energy`, `von_mises` | in all, and the largest of any cell |
 //!
-//! Columns of loads and reactions are there where the scene has such. Units are those of `summary.json`.
+//! Columns of loads and reactions are there where any row has such. Units are those of `summary.json`.
 
 use std::path::PathBuf;
 
@@ -54,11 +54,10 @@ fn keys(steps: &[LoadStep]) -> Vec<&str> {
 
 /// Loads that have columns: all together (`None`) and, of several, each.
 fn loads(steps: &[LoadStep]) -> Vec<Option<usize>> {
-    let Some(mechanics) = steps.first().map(|step| &step.mechanics).filter(|one| one.load.is_some()) else {
-        return Vec::new();
-    };
-    let each = if mechanics.loads.len() > 1 { mechanics.loads.len() } else { 0 };
-    std::iter::once(None).chain((0..each).map(Some)).collect()
+    let all = steps.iter().any(|step| step.mechanics.load.is_some()).then_some(None);
+    let most = steps.iter().map(|step| step.mechanics.loads.len()).max().unwrap_or(0);
+    let each = (0..most).filter(|_| most > 1).map(Some);
+    all.into_iter().chain(each).collect()
 }
 
 fn header(scene: &Scene, loads: &[Option<usize>], keys: &[&str]) -> Vec<String> {

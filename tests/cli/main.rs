@@ -17,6 +17,7 @@ mod install;
 mod interrupt;
 #[path = "../common/json.rs"]
 mod json;
+mod load_steps;
 mod material;
 mod measured;
 #[cfg(target_os = "linux")]
