@@ -20,7 +20,7 @@ use crate::flock::role::Role;
 use crate::flock::rules::{FeedbackReference, Mean, Rotation};
 use crate::geometry::point::area;
 use crate::material::outline_loads::Resultant;
-use crate::scene::raw::RawLoad;
+use crate::scene::raw::{RawAction, RawActionKind, RawLoad};
 use crate::scene::text::{counted, percent};
 use crate::scene::{LoadSteps, Scene, SceneError, Weights as SceneWeights};
 use crate::sweep::{Order, Sweep};
@@ -53,6 +53,16 @@ impl PlanReport {
             cautions: cautions(scene, plan, deviation.as_ref()),
         };
         report.capabilities(scene, plan);
+        // What an action asks for later is not left out.
+        let (later, left_out) = std::mem::take(&mut report.left_out)
+            .into_iter()
+            .partition(|(key, _)| set_later(scene, key).is_some());
+        report.left_out = left_out;
+        let later = later.into_iter().filter_map(|(key, _): (String, String)| {
+            let (k, at) = set_later(scene, &key)?;
+            Some((format!("{key} from step {at} on"), format!("actions[{k}]")))
+        });
+        report.modelled.extend(later);
         Ok(report)
     }
 
@@ -104,7 +114,10 @@ impl PlanReport {
         let fracture = plan.setup.flock.bonds.as_ref().map(|bonds| match bonds.threshold {
             Some(Threshold::Distance(df)) => format!("fracture past df = {df} {}", scene.unit()),
             Some(Threshold::Stretch(ratio)) => format!("fracture past {ratio} times a bond's length"),
-            None => "broken bonds (no threshold: only cuts and ghosts break them)".to_owned(),
+            None => match set_later(scene, "fracture") {
+                Some((k, at)) => format!("broken bonds, by a threshold from step {at} on (actions[{k}])"),
+                None => "broken bonds (no threshold: only cuts and ghosts break them)".to_owned(),
+            },
         });
         self.models_or_not(fracture, "fracture", "no bond can break");
         let anew =
@@ -125,6 +138,32 @@ impl PlanReport {
             None => self.left_out.push((key.to_owned(), because.to_owned())),
         }
     }
+}
+
+/// The first action that sets a key, or something in it: its number, and the step from which on it holds.
+fn set_later(scene: &Scene, key: &str) -> Option<(usize, usize)> {
+    let is_in_it = |rest: &str| rest.starts_with(['=', '.', '[']);
+    let sets = |action: &RawAction| match &action.what {
+        RawActionKind::Set { keys } => keys
+            .iter()
+            .any(|set| set.trim_start().strip_prefix(key).is_some_and(|rest| is_in_it(rest.trim_start()))),
+        RawActionKind::Cut { .. } => false,
+    };
+    let found = scene.raw.actions.iter().enumerate().find(|(_, action)| sets(action));
+    found.map(|(k, action)| (k, action.at))
+}
+
+/// What is done to the body while it is stepped.
+fn actions(scene: &Scene) -> impl Iterator<Item = (String, String)> + '_ {
+    scene.raw.actions.iter().enumerate().map(|(k, RawAction { at, what })| {
+        let what = match what {
+            RawActionKind::Set { keys } => format!("from step {at} on {}", keys.join(", ")),
+            RawActionKind::Cut { from: [x, y], to: [to_x, to_y] } => {
+                format!("at step {at} bonds break from ({x}, {y}) to ({to_x}, {to_y})")
+            }
+        };
+        (format!("actions[{k}]"), what)
+    })
 }
 
 /// How much of the body is of other materials.
@@ -220,7 +259,8 @@ fn facts(
     let outline = outline_facts(scene, plan, deviation);
     let last = [("stops", stop)];
     let facts = first.into_iter().chain(swept.into_iter().flatten()).chain(moving).chain(last);
-    Ok(facts.map(|(name, value)| (name.to_owned(), value)).chain(outline).collect())
+    let facts = facts.map(|(name, value)| (name.to_owned(), value));
+    Ok(facts.chain(actions(scene)).chain(outline).collect())
 }
 
 /// Parts of the shape's area, and of its size, beyond which a body that differs from it is worth a caution.
@@ -297,7 +337,7 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
         cautions.extend(edge_stress::cautions(edge.of(body, cells), (body, cells, elastic), |own| own));
     }
     let is_moved = scene.roles.iter().any(|entry| entry.motion.is_some());
-    if !is_moved && plan.setup.flock.forces.is_none() {
+    if !is_moved && plan.setup.flock.forces.is_none() && set_later(scene, "loads").is_none() {
         cautions.push(
             "no particle is moved and nothing pushes: the body relaxes by itself, or stays as it is".into(),
         );

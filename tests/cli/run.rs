@@ -454,6 +454,14 @@ fn a_plan_says_what_is_modelled_left_out_and_why() {
     assert!(files(folder.path()).is_empty());
     let said = done(&["plan", "tension", "--set", "rule.mean={kind=\"distance\"}"], folder.path());
     assert!(said.contains("caution") && said.contains("sequential"), "{said}");
+    let later = "actions=[{at=21,what={kind='set',keys=['rule.feedback.factor=-0.1']}}]";
+    let said = done(&["plan", "tension", "--set", later], folder.path());
+    let words = [
+        "from step 21 on rule.feedback.factor=-0.1",
+        "rule.feedback from step 21 on",
+        "because of actions[0]",
+    ];
+    assert!(words.iter().all(|words| said.contains(words)) && !said.contains("not overshot"), "{said}");
 }
 
 #[test]
