@@ -1,6 +1,6 @@
 //! From the roles of a scene to what its particles are made to do.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use super::Layout;
 use crate::engine::setup::RoleChange;
@@ -108,8 +108,8 @@ fn covered(changes: &[RoleChange], body: &Body, team: Option<&Team>) -> Vec<Cove
     entries.into_iter().enumerate().map(covered).collect()
 }
 
-/// Refuses single components of particles all of which an entry above holds altogether: nothing would be left of them. On all
-/// ranks alike, where each has a part of the body.
+/// Refuses single components of particles all of which an entry above holds altogether: nothing would be left of them; and
+/// entries that take particles later of which one component is held. On all ranks alike, where each has a part of the body.
 pub fn require_free_components(
     scene: &Scene,
     changes: &[RoleChange],
@@ -122,6 +122,15 @@ pub fn require_free_components(
             let message = format!("is without effect: roles[{first}] {hold} these particles altogether");
             let help = "leave it out, or take its particles out of the other region";
             return Err(scene.refuse(&format!("roles[{entry}].axis"), message, help));
+        }
+    }
+    let held: HashSet<usize> = held_components(changes, body, 0.0).iter().map(|held| held.particle).collect();
+    for (k, change) in changes.iter().enumerate().filter(|(_, change)| !change.is_at_once()) {
+        let takes_held = change.particles.iter().any(|i| body.owned().contains(i) && held.contains(i));
+        if team.map_or(takes_held, |team| team.any(takes_held)) {
+            let message = "takes particles later of which one component is held from the start and for good";
+            let help = "take them out of its region, or leave axis out of the entry that holds them";
+            return Err(scene.refuse(&format!("roles[{k}].region"), message.to_owned(), help));
         }
     }
     Ok(())
@@ -166,7 +175,8 @@ pub fn held_components(changes: &[RoleChange], body: &Body, step: f64) -> Vec<He
     for change in changes.iter().filter(|change| change.is_at_once()) {
         for (which, &i) in change.particles.iter().enumerate() {
             let Some(axis) = change.axis else {
-                components.retain(|(particle, _), _| *particle != i);
+                components.remove(&(i, 0));
+                components.remove(&(i, 1));
                 continue;
             };
             let moved = match &change.motion {

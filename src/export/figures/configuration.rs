@@ -11,6 +11,7 @@ use super::heading::{Heading, Key, Mark, draw_mark};
 use super::page::{self, Bounds};
 use super::raster::Raster;
 use super::svg::{Path, Svg};
+use crate::continuum::layout::roles::held_components;
 use crate::continuum::record::Snapshot;
 use crate::export::bonds;
 use crate::flock::role::Role;
@@ -150,7 +151,7 @@ impl Setting {
             Style::Surface | Style::Raster if is_field => Vec::new(),
             _ => self.legend(style == Style::Raster, is_field),
         };
-        let is_railed = style == Style::Dots && rails(subject).next().is_some();
+        let is_railed = style == Style::Dots && !rails(subject).is_empty();
         let rail = || Key::new("held along one axis", colour::of_role(Role::Clamped), Mark::Line);
         let rail = is_railed.then(rail);
         let legend = legend.into_iter().chain(rail).collect();
@@ -295,17 +296,15 @@ fn draw_dots(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, spacing: f64, fiel
 }
 
 /// Particles of which one component is held or led from the start, with the axis along which they may move.
-fn rails<'a>(subject: &Subject<'a>) -> impl Iterator<Item = (usize, Axis)> + 'a {
-    let changes = subject.changes.iter().filter(|change| change.is_at_once());
-    changes.filter_map(|change| Some((change, change.axis?))).flat_map(|(change, held)| {
-        let free = if held == Axis::X { Axis::Y } else { Axis::X };
-        change.particles.iter().map(move |&i| (i, free))
-    })
+fn rails(subject: &Subject<'_>) -> Vec<(usize, Axis)> {
+    let held = held_components(subject.changes, subject.body, 0.0).into_iter();
+    held.map(|held| (held.particle, if held.axis == Axis::X { Axis::Y } else { Axis::X })).collect()
 }
 
 /// A short line along which each of them may move.
 fn draw_rails(svg: &mut Svg, axes: &Axes, subject: &Subject<'_>, snapshot: &Snapshot) {
-    if rails(subject).next().is_none() {
+    let rails = rails(subject);
+    if rails.is_empty() {
         return;
     }
     let radius = dot_radius(axes, subject.body.lattice.spacing());
@@ -315,7 +314,7 @@ fn draw_rails(svg: &mut Svg, axes: &Axes, subject: &Subject<'_>, snapshot: &Snap
         0.5 * radius
     );
     svg.group(attributes, |svg| {
-        for (i, free) in rails(subject) {
+        for (i, free) in rails {
             let [x, y] = axes.place(snapshot.positions.get(i));
             let [dx, dy] = if free == Axis::X { [1.8 * radius, 0.0] } else { [0.0, 1.8 * radius] };
             if [x, y].iter().all(|value| value.is_finite()) {
