@@ -217,30 +217,18 @@ pub fn require_held(
         let [first, held, whole] = [of[0], of[1], of[2]].map(|n| n as usize);
         *hold = Hold { first: hold.first.min(first), held: hold.held + held, whole: hold.whole + whole };
     }
-    // Places, each with a number.
-    let gathered = |own: &mut dyn Iterator<Item = (usize, u64)>| -> Vec<([f64; 2], u64)> {
-        let words = |(i, number): (usize, u64)| {
-            let [x, y] = body.reference.get(i).map(f64::to_bits);
-            [x, y, number, body.index(i) as u64]
+    let places = || -> Vec<HeldPlace> {
+        let words = |i: usize| {
+            let ([x, y], axes) = (body.reference.get(i).map(f64::to_bits), held[i].map(u64::from));
+            let of = |&cell: &u32| [x, y, part[cell as usize] as u64, axes[0], axes[1], body.index(i) as u64];
+            incidence.of(i).iter().flat_map(of).collect::<Vec<_>>()
         };
+        let own = body.owned().filter(|&i| held[i] != [false; 2]);
         let all = team.gather_all(&own.flat_map(words).collect::<Vec<_>>());
-        let mut all: Vec<_> = all.chunks_exact(4).collect();
-        all.sort_by_key(|of| of[3]);
+        let mut all: Vec<_> = all.chunks_exact(6).collect();
+        all.sort_by_key(|of| of[5]);
         let place = |of: &[u64]| [0, 1].map(|k| f64::from_bits(of[k]));
-        all.into_iter().map(|of| (place(of), of[2])).collect()
+        all.into_iter().map(|of| (place(of), of[2] as usize, [of[3] == 1, of[4] == 1])).collect()
     };
-    let members = |group: usize| -> Vec<HeldPlace> {
-        let own = body.owned().filter(|&i| held[i] != [false; 2] && group_of(i) == Some(group));
-        let axes = |i: usize| u64::from(held[i][0]) | u64::from(held[i][1]) << 1;
-        let all = gathered(&mut own.map(|i| (i, axes(i))));
-        all.into_iter().map(|(place, axes)| (place, [axes & 1 == 1, axes & 2 == 2])).collect()
-    };
-    let grounded = || {
-        let own = body.owned().filter(|&i| held[i] == [true; 2]);
-        let cells =
-            own.flat_map(|i| incidence.of(i).iter().map(move |&cell| (i, part[cell as usize] as u64)));
-        let all = gathered(&mut { cells });
-        all.into_iter().map(|(place, part)| (place, part as usize)).collect()
-    };
-    linkage.require_held(body.bounds(), &holds, members, grounded)
+    linkage.require_held(body.bounds(), &holds, places)
 }

@@ -6,6 +6,8 @@
 //! particles that they share, and the body is refused if that linkage can move other than as a whole.
 //! A hinge between parts that are pinned elsewhere too is harmless and passes.
 
+use std::cell::LazyCell;
+
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::cells::{Cells, Incidence};
@@ -114,8 +116,8 @@ impl Hold {
     }
 }
 
-/// A place \[length\] and the components that are held there.
-pub type HeldPlace = (Point, [bool; 2]);
+/// A place \[length\] of a part, and the components that are held there.
+pub type HeldPlace = (Point, usize, [bool; 2]);
 
 /// Lower and higher corner of what the body stands in \[length\].
 pub type Bounds = (Point, Point);
@@ -153,16 +155,12 @@ pub fn require_held(
             holds[group] = holds[group].with(i, held);
         }
     }
-    let members = |group: usize| {
-        let members = (0..held.len()).filter(|&i| held[i] != [false; 2] && group_of(i) == Some(group));
-        members.map(|i| (reference.get(i), held[i])).collect()
-    };
-    let grounded = || {
-        let whole = (0..held.len()).filter(|&i| held[i] == [true; 2]);
+    let places = || {
+        let held_of = (0..held.len()).filter(|&i| held[i] != [false; 2]);
         let of = |i: usize| incidence.of(i).iter().map(move |&cell| (i, cell));
-        whole.flat_map(of).map(|(i, cell)| (reference.get(i), part[cell as usize])).collect()
+        held_of.flat_map(of).map(|(i, cell)| (reference.get(i), part[cell as usize], held[i])).collect()
     };
-    linkage.require_held(bounds_of(reference), &holds, members, grounded)
+    linkage.require_held(bounds_of(reference), &holds, places)
 }
 
 fn bounds_of(reference: &Vectors) -> Bounds {
@@ -173,10 +171,10 @@ fn bounds_of(reference: &Vectors) -> Bounds {
 fn free_motions(members: &[HeldPlace]) -> usize {
     let centre = members
         .iter()
-        .fold([0.0; 2], |[x, y], (p, _)| [x + p[0] / members.len() as f64, y + p[1] / members.len() as f64]);
+        .fold([0.0; 2], |[x, y], (p, ..)| [x + p[0] / members.len() as f64, y + p[1] / members.len() as f64]);
     let from = |p: Point| [0, 1].map(|k| p[k] - centre[k]);
-    let size = members.iter().map(|&(p, _)| from(p)[0].hypot(from(p)[1])).fold(f64::MIN_POSITIVE, f64::max);
-    let rows = members.iter().flat_map(|&(p, held)| {
+    let size = members.iter().map(|&(p, ..)| from(p)[0].hypot(from(p)[1])).fold(f64::MIN_POSITIVE, f64::max);
+    let rows = members.iter().flat_map(|&(p, _, held)| {
         let [x, y] = from(p).map(|v| v / size);
         let components = [[1.0, 0.0, -y], [0.0, 1.0, x]].into_iter().zip(held);
         components.filter_map(|(row, held)| held.then_some(row))
@@ -247,15 +245,18 @@ impl Linkage {
     }
 
     /// Refuses parts that can move though some of their particles are held: `holds` says how many of each group, shape
-    /// \[parts\]; `members` are those of a group, and `grounded` all that are held altogether, with each of their parts, both in
-    /// the order of particles and asked for only where the counts do not decide.
+    /// \[parts\]; `held` are those, each for the part of every cell around it, in the order of particles, and asked for only
+    /// where the counts do not decide.
     pub fn require_held(
         &self,
         bounds: Bounds,
         holds: &[Hold],
-        members: impl Fn(usize) -> Vec<HeldPlace>,
-        grounded: impl FnOnce() -> Vec<(Point, usize)>,
+        held: impl FnOnce() -> Vec<HeldPlace>,
     ) -> Result<(), Mechanism> {
+        let (places, groups) = (LazyCell::new(held), self.groups());
+        let members = |group: usize| {
+            places.iter().copied().filter(|place| groups[place.1] == group).collect::<Vec<_>>()
+        };
         for (group, &Hold { first, held, whole }) in holds.iter().enumerate() {
             if first == usize::MAX {
                 continue;
@@ -269,7 +270,7 @@ impl Linkage {
                 _ => {}
             }
         }
-        if self.hinges.is_empty() { Ok(()) } else { self.require_no_turning(bounds, &grounded()) }
+        if self.hinges.is_empty() { Ok(()) } else { self.require_no_turning(bounds, &places) }
     }
 
     fn require_joined(&self) -> Result<(), Mechanism> {
@@ -283,9 +284,9 @@ impl Linkage {
         }
     }
 
-    /// Looks for motions of the parts that keep every pin together and every grounded place of a part
-    /// where it is, other than a motion of the whole, and names the pin that turns most.
-    fn require_no_turning(&self, (low, high): Bounds, grounded: &[(Point, usize)]) -> Result<(), Mechanism> {
+    /// Looks for motions of the parts that keep every pin together and every held component of a place where it is, other
+    /// than a motion of the whole, and names the pin that turns most.
+    fn require_no_turning(&self, (low, high): Bounds, held: &[HeldPlace]) -> Result<(), Mechanism> {
         if self.parts() > MOST_PARTS {
             return Err(Mechanism::Hinge { particle: self.hinges[0].particle + 1 });
         }
@@ -301,8 +302,9 @@ impl Linkage {
                 row.iter().for_each(|&(b, v)| gram[(a, b)] += u * v);
             }
         };
-        for &(place, part) in grounded {
-            velocity(place, part, 1.0).iter().for_each(|row| constrain(row));
+        for &(place, part, held) in held {
+            let rows = velocity(place, part, 1.0).into_iter().zip(held);
+            rows.filter(|(_, held)| *held).for_each(|(row, _)| constrain(&row));
         }
         for Hinge { place, parts, .. } in &self.hinges {
             for &part in &parts[1..] {
@@ -435,5 +437,24 @@ mod tests {
             "three pins on a line"
         );
         assert_eq!(held(&hinged, &[[1, 0], [2, 2]]), Ok(()), "an arch");
+    }
+
+    #[test]
+    fn rollers_stop_a_hinge_where_it_would_move_across_them() {
+        let (cells, reference, sites) = squares(&[[0, 0], [1, 1]]);
+        let held = |rollers: &[(Site, [bool; 2])]| {
+            let mut held = vec![[false; 2]; sites.len()];
+            for (site, axes) in rollers {
+                held[sites.iter().position(|own| own == site).unwrap()] = *axes;
+            }
+            require_held(&cells, &cells.incidence(reference.len()), &reference, &held)
+        };
+        let base = [([0, 0], [true; 2]), ([0, 1], [true; 2])];
+        let with = |site: Site, axes: [bool; 2]| held(&[base[0], base[1], (site, axes)]);
+        // The upper square turns about (1, 1): its corner (2, 1) moves up and down, the corner (1, 2) to the sides.
+        assert_eq!(with([2, 1], [false, true]), Ok(()));
+        assert_eq!(with([1, 2], [true, false]), Ok(()));
+        assert_eq!(with([2, 1], [true, false]), Err(Mechanism::Hinge { particle: 4 }));
+        assert_eq!(with([1, 2], [false, true]), Err(Mechanism::Hinge { particle: 4 }));
     }
 }
