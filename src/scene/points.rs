@@ -89,6 +89,8 @@ mod tests {
         assert_eq!(error("x,x\n1,2\n"), "line 1: the header is `x,x`, not `x,y` or `id,x,y`");
         assert_eq!(error("x,y\n1,2\n3,NaN\n"), "line 3: `y` = `NaN` is not a finite number");
         assert_eq!(error("x,y\n1,inf\n"), "line 2: `y` = `inf` is not a finite number");
+        let scaled = PointTable::parse("x,y\n1,1e300\n", 1e10).unwrap_err();
+        assert_eq!(scaled, "line 2: `y` = `1e300` is not a number that is finite also times the scale");
         assert_eq!(error("id,x,y\n0,1,1\n"), "line 2: `id` = `0` is not a whole number from 1 to 4294967295");
         assert_eq!(error("id,x,y\n1,1,1\n2,0,1\n1,2,2\n"), "lines 2 and 4: both have `id` = 1");
         assert_eq!(error("x,y\n5,5\n0,1\n-0,1\n5,5\n"), "lines 3 and 4: both are at (0, 1)");

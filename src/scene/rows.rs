@@ -65,7 +65,9 @@ impl<'r> Row<'r> {
     pub fn number(&self, column: usize, scale: f64) -> Result<f64, String> {
         // The sum makes 0.0 of -0.0, which is the same place.
         let value = self.text(column).parse::<f64>().ok().map(|value| scale * value + 0.0);
-        value.filter(|value| value.is_finite()).ok_or_else(|| self.refuse(column, "a finite number"))
+        let what =
+            if scale == 1.0 { "a finite number" } else { "a number that is finite also times the scale" };
+        value.filter(|value| value.is_finite()).ok_or_else(|| self.refuse(column, what))
     }
 
     /// A whole number that is not negative.

@@ -8,6 +8,9 @@ mod schema_rule;
 use std::io::ErrorKind;
 use std::thread::ScopedJoinHandle;
 
+use schemars::generate::SchemaSettings;
+use schemars::transform::RecursiveTransform;
+use schemars::{JsonSchema, Schema};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use toml::Spanned;
@@ -26,6 +29,18 @@ pub(crate) const MAX_DEPTH: usize = 64;
 /// Where there are no threads, as in a browser, the parser has the stack of its caller. Optimised, the deepest such
 /// document takes about half of the 1 MiB usual there; a build that needs more for it ends in a trap.
 const PARSER_STACK_BYTES: usize = 64 << 20;
+
+/// The JSON Schema of a kind of file.
+pub fn schema_of<Raw: JsonSchema>() -> Value {
+    // A key that may be left out of a group with defaults is absent then: TOML has no null.
+    let without_null = RecursiveTransform(|schema: &mut Schema| {
+        if schema.get("default").is_some_and(Value::is_null) {
+            schema.remove("default");
+        }
+    });
+    let settings = SchemaSettings::draft2020_12().with_transform(without_null);
+    settings.into_generator().into_root_schema_for::<Raw>().into()
+}
 
 /// Values longer than this are abbreviated in messages.
 const SHOWN_CHARACTERS: usize = 60;

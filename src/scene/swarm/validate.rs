@@ -9,8 +9,8 @@ use super::{NamedManoeuvre, Shape, Swarm};
 use crate::flock::manoeuvre::{Leg, Posture};
 use crate::flock::rules::Rule;
 use crate::geometry::point::area;
-use crate::scene::document::Document;
 use crate::scene::document::problem::SceneError;
+use crate::scene::document::{Document, schema_of};
 use crate::scene::raw::{
     RawBody, RawFrame, RawLattice, RawMean, RawRecord, RawRest, RawScene, RawShape, RawStop, RawUpdate,
     RawWeights,
@@ -85,7 +85,7 @@ impl Swarm {
 
 /// The JSON Schema of a swarm file.
 pub fn schema() -> serde_json::Value {
-    schemars::schema_for!(RawSwarm).into()
+    schema_of::<RawSwarm>()
 }
 
 fn shape(

@@ -11,8 +11,8 @@ pub(super) mod roles;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::document::Document;
 use super::document::problem::{Problem, SceneError};
+use super::document::{Document, schema_of};
 use super::raw::*;
 use super::{BodySource, Fracture, PoissonTerm, Record, Scene, Stop, Weights, text};
 use crate::flock::body::Cut;
@@ -75,7 +75,7 @@ fn build(name: &str, document: Document, folder: Option<&Path>) -> Result<Scene,
 
 /// The JSON Schema of a scene file.
 pub fn schema() -> serde_json::Value {
-    schemars::schema_for!(RawScene).into()
+    schema_of::<RawScene>()
 }
 
 /// A file as read from disk.
