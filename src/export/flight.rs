@@ -73,7 +73,7 @@ const BOUND: &str = "#444444";
 /// Shape and clearance against time, with what is declared of them.
 pub(super) fn charts(record: &Record, report: &FlightReport) -> Vec<Chart> {
     let series = |name: &str, colour, of: &dyn Fn(&Sample) -> Option<f64>| {
-        let points = record.samples.iter().filter_map(|s| of(s).map(|value| [s.time, value])).collect();
+        let points = record.samples.iter().map(|s| [s.time, of(s).unwrap_or(f64::NAN)]).collect();
         Series::new(name, colour, Style::Line, points)
     };
     let time = || Axis::new("time", "s");
@@ -108,7 +108,8 @@ pub(super) fn charts(record: &Record, report: &FlightReport) -> Vec<Chart> {
             shape.iter().cloned().chain(bounds).filter(visible).collect(),
         ));
     }
-    if !clearance.points.is_empty() {
+    let is_known = |s: &Series| s.points.iter().any(|point| point[1].is_finite());
+    if is_known(&clearance) {
         charts.push(Chart::new(
             "Smallest free space",
             "between two robots' rims, or a rim and an obstacle",
@@ -122,7 +123,7 @@ pub(super) fn charts(record: &Record, report: &FlightReport) -> Vec<Chart> {
             &report.title,
             errors,
             [time(), Axis::new("distance", "m")],
-            shape.into_iter().filter(|s| !s.points.is_empty()).collect(),
+            shape.into_iter().filter(is_known).collect(),
         ));
     }
     charts

@@ -16,6 +16,8 @@ const PANEL_GAP: f64 = 16.0;
 const RIGHT: f64 = 26.0;
 const TEXT: f64 = 12.0;
 const TICK: f64 = 5.0;
+/// Radius of a point of a line between two gaps \[px\].
+const LONE: f64 = 2.0;
 const GRID: &str = "#e6e8eb";
 
 /// Points of a line that a page or a sheet can show; a longer one keeps the extremes of each stretch.
@@ -53,7 +55,8 @@ pub enum Style {
     Beads,
 }
 
-/// A set of points, in the legend if it has a name; those that an axis cannot show (zero on a logarithmic one) are left out.
+/// A set of points, in the legend if it has a name; those that an axis cannot show (no number, zero on a logarithmic one) are left
+/// out, gaps in its line.
 #[derive(Clone, Debug, Serialize)]
 pub struct Series {
     pub name: String,
@@ -108,7 +111,9 @@ impl Chart {
     pub(crate) fn on_page(&self) -> Self {
         let mut chart = self.clone();
         for series in chart.series.iter_mut().filter(|series| series.style == Style::Line) {
-            series.points = thinned(&series.points);
+            let lines = series.points.split_inclusive(|point| !point[1].is_finite());
+            let gap = |line: &[[f64; 2]]| line.last().copied().filter(|last| !last[1].is_finite());
+            series.points = lines.flat_map(|line| thinned(line).into_iter().chain(gap(line))).collect();
         }
         chart.landmarks.iter_mut().for_each(|mark| mark.name = mark.name.replace('\n', ", "));
         chart
@@ -212,11 +217,16 @@ fn window(chart: &Chart, height: f64) -> Axes {
                 let margin = if k == 0 && chart.follows_clock { 0.0 } else { 0.05 * extent };
                 [low - margin, high + margin]
             }
-            _ => [low - 0.5, high + 0.5],
+            _ => [low - room(low, axis.is_log), high + room(low, axis.is_log)],
         }
     };
     let [x, y] = [range(0), range(1)];
     Axes { corner: [0.0; 2], size: [page::WIDTH, height], low: [x[0], y[0]], high: [x[1], y[1]] }
+}
+
+/// What an axis has on either side of a single value, as it counts.
+pub(super) fn room(value: f64, is_log: bool) -> f64 {
+    if is_log || value == 0.0 { 0.5 } else { 0.5 * value.abs() }
 }
 
 /// Positions of ticks as the axes count, with their labels (none for a minor tick).
@@ -313,7 +323,13 @@ fn draw_series(svg: &mut Svg, chart: &Chart, axes: &Axes, series: &Series) {
         let mut path = Path::default();
         // What an axis cannot show, as a logarithmic one zeros, is a gap.
         for line in series.points.split(|point| on_axes(chart, *point).is_none()) {
-            path.polyline(thinned(&line.iter().filter_map(place).collect::<Vec<_>>()));
+            match &line.iter().filter_map(place).collect::<Vec<_>>()[..] {
+                // A line of one point would not be seen.
+                [at] if series.style == Style::Line => {
+                    svg.group(format_args!("fill=\"{}\"", series.colour), |svg| svg.circle(*at, LONE));
+                }
+                line => path.polyline(thinned(line)),
+            }
         }
         let width = if series.style == Style::Line { 1.7 } else { 1.0 };
         let stroke =
@@ -401,6 +417,31 @@ mod tests {
         let line = svg.split("class=\"series\"").nth(1).expect("drawn").split("/>").next().expect("ends");
         assert_eq!((line.matches('M').count(), line.matches('L').count()), (2, 2), "{line}");
         assert!(svg.contains(">50<"), "{svg}");
+    }
+
+    #[test]
+    fn a_line_has_a_gap_where_there_is_no_number_and_a_point_between_two_is_seen() {
+        let known = |from: u32| (from..from + 3).map(|n| [f64::from(n), 1.0]);
+        let none = |at: f64| [[at, f64::NAN]].into_iter();
+        let points = known(0).chain(none(3.0)).chain([[4.0, 2.0]]).chain(none(5.0)).chain(known(6)).collect();
+        let series = Series::new("", "#123456", Style::Line, points);
+        let chart = Chart::new("T", "", [Axis::new("time", "s"), Axis::new("error", "m")], vec![series]);
+        let svg = draw(&chart);
+        let line = svg.split("class=\"series\"").nth(1).expect("drawn").split("/>").next().expect("ends");
+        assert_eq!((line.matches('M').count(), svg.matches("<circle").count()), (2, 1), "{line}");
+        let on_page = &chart.on_page().series[0].points;
+        assert_eq!(on_page.iter().filter(|point| point[1].is_nan()).count(), 2, "{on_page:?}");
+    }
+
+    #[test]
+    fn a_single_value_of_any_size_is_in_the_middle_of_its_axis() {
+        for value in [4e17, 4.2e-3, -7.0, 0.0] {
+            let series = Series::new("", "#123456", Style::Dots, vec![[1.0, value], [2.0, value]]);
+            let chart = Chart::new("T", "", [Axis::new("time", "s"), Axis::new("error", "m")], vec![series]);
+            let axes = window(&chart, 100.0);
+            assert!(axes.low[1] < value && axes.high[1] > value, "{value}: {axes:?}");
+            assert!(axes.high[1] - axes.low[1] <= 1.0f64.max(1.1 * value.abs()), "{value}: {axes:?}");
+        }
     }
 
     #[test]

@@ -20,13 +20,16 @@ const WAY: &str = "#7fa6dc";
 const LED_WAY: &str = "#f0a09c";
 /// Ways of more robots than this would cover each other.
 const MOST_WAYS: usize = 400;
+/// Places along a side of the fence that are looked for in the window.
+const STOPS: u32 = 256;
 /// Corners of the polygon that stands for a disc.
 const ROUND: usize = 48;
 
 /// The whole flight.
 pub fn flight(swarm: &Swarm, record: &Record, report: &FlightReport) -> String {
     let Some(last) = record.tracks.last() else { return String::new() };
-    let note = format!("{}, {:.1} s", counted(report.robots, "robot"), report.seconds);
+    let seconds = (1e3 * report.seconds).round() / 1e3;
+    let note = format!("{}, {seconds} s", counted(report.robots, "robot"));
     let moment = Moment { flown: record.tracks.len(), places: last, note, field: None };
     Map::new(swarm, record, report, page::around).draw(&moment)
 }
@@ -108,10 +111,22 @@ impl<'a> Map<'a> {
         if !self.swarm.raw.obstacles.is_empty() {
             legend.push(Key::new("obstacle", OBSTACLE, Mark::Dot));
         }
-        if self.swarm.raw.limits.geofence.is_some() {
+        if self.swarm.raw.limits.geofence.as_ref().is_some_and(|fence| self.shows(fence)) {
             legend.push(Key::new("fence", OBSTACLE, Mark::DashedLine));
         }
         legend
+    }
+
+    /// Whether any of a polygon's sides passes through the window.
+    fn shows(&self, corners: &[[f64; 2]]) -> bool {
+        let Axes { low, high, .. } = &self.axes;
+        let is_shown = |[x, y]: [f64; 2]| x >= low[0] && x <= high[0] && y >= low[1] && y <= high[1];
+        let sides = corners.iter().zip(corners.iter().cycle().skip(1));
+        let along = |([ax, ay], [bx, by]): (&[f64; 2], &[f64; 2])| {
+            let at = |part: f64| [ax + part * (bx - ax), ay + part * (by - ay)];
+            (0..=STOPS).any(|k| is_shown(at(f64::from(k) / f64::from(STOPS))))
+        };
+        { sides }.any(along)
     }
 
     fn draw_ways(&self, svg: &mut Svg, axes: &Axes, moment: &Moment<'_>) {

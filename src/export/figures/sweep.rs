@@ -2,7 +2,7 @@
 
 use super::axes::{Axes, Measure};
 use super::bands::Bands;
-use super::chart::{Axis, Chart, Series, Style, draw_below_each_other};
+use super::chart::{Axis, Chart, Series, Style, draw_below_each_other, room};
 use super::colour::{SERIES, viridis};
 use super::heading::Heading;
 use super::page;
@@ -121,7 +121,8 @@ fn lines(swept: &Swept<'_>, key: &Column) -> String {
     let style = if swept.is_grid && key.categories.is_empty() { Style::Line } else { Style::Dots };
     let charts = swept.outputs.iter().take(MOST_CHARTS).enumerate().map(|(n, output)| {
         let pairs = key.values.iter().zip(&output.values);
-        let mut points: Vec<[f64; 2]> = pairs.filter_map(|(&x, &y)| Some([x?, y?])).collect();
+        let points = pairs.filter_map(|(&x, &y)| Some([x?, y.unwrap_or(f64::NAN)]));
+        let mut points: Vec<[f64; 2]> = points.collect();
         points.sort_by(|a, b| a[0].total_cmp(&b[0]));
         let heading = swept.heading(output);
         let series = |style| Series::new("", SERIES[n], style, points.clone());
@@ -188,7 +189,7 @@ fn cell_edges(key: &Column) -> Vec<f64> {
     let middles: Vec<f64> = values.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
     let [before, after] = match (middles.first(), middles.last()) {
         (Some(&next), Some(&before)) => [2.0 * first - next, 2.0 * last - before],
-        _ => [first - 0.5, last + 0.5],
+        _ => [first - room(first, key.is_log), last + room(first, key.is_log)],
     };
     [vec![before], middles, vec![after]].concat()
 }
@@ -202,7 +203,7 @@ fn cell(edges: &[f64], value: f64) -> [f64; 2] {
 /// The ends of an axis that shows all values of a key, with room for dots.
 fn around(key: &Column) -> Vec<f64> {
     let [low, high] = key.ends();
-    let room = if high > low { 0.04 * (high - low) } else { 0.5 };
+    let room = if high > low { 0.04 * (high - low) } else { room(low, key.is_log) };
     vec![low - room, high + room]
 }
 
@@ -256,7 +257,10 @@ fn parallel(swept: &Swept<'_>, output: &Column) -> String {
         }
         // Long names in two rows do not meet.
         let below = top + HEIGHT + if k % 2 == 0 { 16.0 } else { 34.0 };
-        svg.text([x(k), below], Anchor::Middle, TEXT, INK, &ticks.axis_name(&column.label(), ""));
+        let name = ticks.axis_name(&column.label(), "");
+        let half = (0.5 * text_width(&name, TEXT) + 4.0).min(0.5 * page::WIDTH);
+        let middle = x(k).clamp(half, page::WIDTH - half);
+        svg.text([middle, below], Anchor::Middle, TEXT, INK, &name);
     }
     svg.finish()
 }

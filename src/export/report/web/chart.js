@@ -65,6 +65,9 @@ export class Chart {
       const part = ([x, y], n) => (isShown(n) ? `${isShown(n - 1) ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}` : "");
       const d = line.map(part).join("");
       svg("path", { d, fill: "none", stroke: ink, "stroke-width": style === "line" ? 1.8 : 1.2, "stroke-linejoin": "round" }, parent);
+      // A line of one point would not be seen.
+      const isLone = (_, n) => style === "line" && isShown(n) && !isShown(n - 1) && !isShown(n + 1);
+      for (const [cx, cy] of line.filter(isLone)) svg("circle", { cx: cx.toFixed(1), cy: cy.toFixed(1), r: 2, fill: ink }, parent);
     }
     if (style === "line") return;
     const radius = { dots: 4, rings: 4, front: 6.5, beads: 6 }[style];
@@ -89,7 +92,10 @@ export class Chart {
     const finite = values.filter(Number.isFinite);
     let [low, high] = finite.reduce(([l, h], v) => [Math.min(l, v), Math.max(h, v)], [Infinity, -Infinity]);
     if (!finite.length) [low, high] = [0, 1];
-    if (!(high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high), 1e-300))) [low, high] = [low - 0.5, high + 0.5];
+    if (!(high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high), 1e-300))) {
+      const around = axis.log || low === 0 ? 0.5 : 0.5 * Math.abs(low);
+      [low, high] = [low - around, high + around];
+    }
     const margin = k === 0 && this.plot.follows_clock ? 0 : 0.05 * (high - low);
     return [low - margin, high + margin];
   }
@@ -123,7 +129,7 @@ export class Chart {
       svg("text", attributes, root).textContent = name;
     });
     for (const series of this.shown()) {
-      const places = series.points.map((point) => [x(point[0]), y(point[1])]);
+      const places = series.points.map((point) => [x(point[0]), point[1] === null ? NaN : y(point[1])]);
       this.drawMark(root, series, places, places.filter((place) => place.every(Number.isFinite)));
     }
     this.cursor = svg("line", { y1: room.top, y2: room.top + size[1], stroke: "var(--accent)", "stroke-width": 1.5, visibility: "hidden" }, root);
@@ -193,6 +199,7 @@ export class Chart {
     let best = { away: NEAR };
     for (const series of this.shown()) {
       series.points.forEach((point, n) => {
+        if (point[1] === null) return;
         const [x, y] = [this.x(point[0]), this.y(point[1])];
         const away = Math.hypot(x - px, y - py);
         if (away < best.away) best = { away, x, y, series, point, label: series.labels[n] };
