@@ -384,7 +384,7 @@ impl Formation {
         let lists = (0..self.count()).map(|m| self.neighbours(m).map(|k| k as u32).collect::<Vec<_>>());
         let leaders: Vec<bool> = (0..self.count()).map(|m| self.leads(m)).collect();
         supported(&Neighbours::from_lists(lists), &leaders, liars, self.trim())
-            .map_err(|unsupported| format!("`{}` {unsupported}", self.names[unsupported.member()]))
+            .map_err(|unsupported| format!("`{}` {unsupported}", self.names[unsupported.member]))
     }
 
     /// The neighbours of a member among the members.

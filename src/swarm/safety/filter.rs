@@ -2,7 +2,7 @@
 
 use super::cell::{Cell, HalfPlane, length, shortened};
 use super::deadlock::Detour;
-use super::limits::{Limits, SafetyError};
+use super::limits::{Limits, Place, SafetyError};
 use super::obstacles::Obstacles;
 use super::step::TOUCHING;
 use super::ways::Ways;
@@ -129,7 +129,8 @@ impl Filter {
         limits.check()?;
         let wrong = radii.iter().position(|radius| !(radius.is_finite() && *radius >= 0.0));
         if let Some(member) = wrong {
-            return Err(SafetyError::Radius { member, radius: radii[member] });
+            let fault = format!(" = {} m: give a number from 0 up", radii[member]);
+            return Err(Place::Radius(member).refused(fault));
         }
         let fence = limits.geofence.as_deref().map(Obstacles::fence).transpose()?.unwrap_or_default();
         Ok(Self {

@@ -81,6 +81,8 @@ const MOST_PAIRS: usize = 20_000_000;
 
 /// Largest coordinate accepted \[m\]: squares must not overflow.
 const LARGEST: f64 = 1e100;
+const NOT_FINITE: &str =
+    " has a number that is not finite or beyond 1e100 m: give finite coordinates in metres";
 
 impl Obstacles {
     /// # Errors
@@ -161,10 +163,10 @@ impl Obstacles {
 
     fn add_disc(&mut self, centre: [f64; 2], radius: f64, place: Place) -> Result<(), SafetyError> {
         if !centre.iter().chain([&radius]).all(|value| value.abs() <= LARGEST) {
-            return Err(SafetyError::NotFinite { place });
+            return Err(place.refused(NOT_FINITE));
         }
         if radius <= 0.0 {
-            return Err(SafetyError::Disc { place, radius });
+            return Err(place.refused(format!(" has radius {radius} m: give a positive number")));
         }
         self.pieces.push(Piece::Disc { centre: vector(centre), ball: Ball::new(radius) });
         Ok(())
@@ -410,10 +412,10 @@ impl Outline {
 fn check_polygon(corners: &[[f64; 2]], place: Place) -> Result<f64, SafetyError> {
     let count = corners.len();
     if count < 3 {
-        return Err(SafetyError::Corners { place, count });
+        return Err(place.refused(format!(" has {count} corners: give at least 3")));
     }
     if !corners.iter().flatten().all(|value| value.abs() <= LARGEST) {
-        return Err(SafetyError::NotFinite { place });
+        return Err(place.refused(NOT_FINITE));
     }
     let edge = |k: usize| (corners[k], corners[(k + 1) % count]);
     let bounds = |k: usize| {
@@ -430,17 +432,22 @@ fn check_polygon(corners: &[[f64; 2]], place: Place) -> Result<f64, SafetyError>
             second >= first + 2 && !(first == 0 && second == count - 1) && segments_cross(a, b, c, d)
         });
         if let Some(second) = others.min() {
-            return Err(SafetyError::Crossing { place, first, second });
+            return Err(place.refused(format!(
+                ": edges {first} and {second} (from 0) cross: give corners in order around the shape"
+            )));
         }
+        // To compare each with those beside it would take minutes.
         if compared > MOST_PAIRS {
-            return Err(SafetyError::TooDense { place, count });
+            return Err(place.refused(format!(
+                ": too many of its {count} edges run side by side to be checked for crossings: give fewer corners"
+            )));
         }
     }
     let twice_area = 2.0 * area(corners);
     let extent =
         corners.iter().flat_map(|&p| minus(p, corners[0])).fold(0.0, |most: f64, off| most.max(off.abs()));
     if twice_area.abs() <= 1e-12 * extent * extent {
-        return Err(SafetyError::NoArea { place });
+        return Err(place.refused(" has no area: give corners that do not lie on one line"));
     }
     Ok(twice_area)
 }

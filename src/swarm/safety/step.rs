@@ -306,7 +306,7 @@ impl Filter {
         let straight = self.cell.share(request.open(scale));
         let direct = shortened(direct, scale);
         let tick = Tick { scale, wanted: way, distance, straight, direct, moved: goal };
-        detour.update(&self.limits.patience, &tick);
+        detour.update(self.limits.patience, &tick);
         goal
     }
 
