@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use iceoryx2::prelude::Config;
 
 use super::ShmError;
+use super::domain::VARIABLE;
 
 /// Removes them when it is dropped, which must be after all that has files in them.
 #[derive(Debug)]
@@ -69,7 +70,16 @@ impl Folders {
         files.retain(|file| is_left(file) && is_unfinished(file, &self.service));
         files.retain(|file| is_open(file) || fs::remove_file(file).is_err());
         files.retain(|file| file.exists());
-        if files.is_empty() { Ok(()) } else { Err(ShmError::Unfinished { files }) }
+        if files.is_empty() {
+            return Ok(());
+        }
+        let listed: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+        let it = if files.len() == 1 { "it" } else { "them" };
+        Err(ShmError::Refused(format!(
+            "a process does not finish {}, for which iceoryx2 waits without end\n  help: end all programs of this domain and \
+             start again, which removes {it}, remove {it} yourself, or take another {VARIABLE}",
+            listed.join(", ")
+        )))
     }
 
     /// Removes the files of a domain in which no process lives, after `clean_up` has removed what iceoryx2 can: what a dead
@@ -144,7 +154,12 @@ fn has_ending(file: &Path, ending: &str) -> bool {
 /// Says how much there is.
 pub(super) fn require_room(bytes: u64) -> Result<(), ShmError> {
     match room() {
-        Some(free) if free < bytes => Err(ShmError::Room { folder: SHARED_MEMORY, needed: bytes, free }),
+        Some(free) if free < bytes => Err(ShmError::Refused(format!(
+            "{SHARED_MEMORY} has {} kB free, and this takes about {} kB\n  help: remove what is not needed there, or make it \
+             larger: `mount -o remount,size=64m {SHARED_MEMORY}`, of a container its `--shm-size`",
+            free / 1000,
+            bytes / 1000
+        ))),
         _ => Ok(()),
     }
 }
