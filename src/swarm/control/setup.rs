@@ -68,7 +68,6 @@ pub fn watch(swarm: &Swarm, formation: &Formation, speed: f64) -> WatchLimits {
     }
 }
 
-/// The filter's limits, from the file.
 fn limits(raw: &RawLimits, flight: &RawFlight) -> Limits {
     Limits {
         brakes: matches!(flight.model, RawModel::DoubleIntegrator),
