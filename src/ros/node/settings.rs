@@ -135,8 +135,8 @@ fn topic(declaration: Declaration, names: Names, robot: String) -> Declaration {
     declaration.describe("topic of each robot; {name} stands for the robot's name").checked(
         "a topic's name",
         move |_, value| {
-            let pattern = value.as_str().unwrap_or_default().replace("{name}", &robot);
-            names.fleet_topic(&pattern).map(|_| ()).map_err(|error| error.to_string())
+            let pattern = value.as_str().unwrap_or_default();
+            names.robot_topic(pattern, &robot).map(drop).map_err(|error| error.to_string())
         },
     )
 }
