@@ -314,13 +314,9 @@ impl Replay {
         }
         match (event.kind, &event.values[..]) {
             (LoopEvent::TICK, &[now]) => self.tick(now),
-            (LoopEvent::ACTIVE, _) => {
-                self.active = true;
-                self.control.set_active(true);
-            }
-            (LoopEvent::INACTIVE, _) => {
-                self.active = false;
-                self.control.set_active(false);
+            (LoopEvent::ACTIVE | LoopEvent::INACTIVE, _) => {
+                self.active = event.kind == LoopEvent::ACTIVE;
+                self.control.set_active(self.active);
             }
             (LoopEvent::EMERGENCY_STOP, _) => self.control.emergency_stop(),
             (LoopEvent::RESUME, _) => {
@@ -364,7 +360,7 @@ impl Replay {
         if !self.begun && is_changed_since {
             return;
         }
-        if !set_parameter(&mut self.control, name, value) {
+        if set_parameter(&mut self.control, name, value) != Ok(true) {
             self.refusal.get_or_insert(format!("parameter {name} = {value} cannot be set"));
         }
     }
@@ -419,8 +415,7 @@ impl Replay {
         }
         self.control.tick(now);
         for (member, today) in self.today.iter_mut().enumerate() {
-            let target = self.control.target(member).filter(|_| self.active && self.mine[member]);
-            *today = target;
+            *today = self.control.target(member).filter(|_| self.active && self.mine[member]);
         }
     }
 
