@@ -131,6 +131,13 @@ impl Folders {
     fn unfinished(&self) -> Vec<PathBuf> {
         self.files().into_iter().filter(|file| is_unfinished(file, &self.service)).collect()
     }
+
+    /// Whether a file of shared memory counts the nodes of this domain: `PREFIX`, a checksum, a name.
+    fn is_counter(&self, name: &str) -> bool {
+        let middle = name.strip_prefix(&self.prefix).and_then(|name| name.strip_suffix(&self.counter));
+        let checksum = middle.and_then(|middle| middle.split_once('_'));
+        checksum.is_some_and(|(sum, _)| !sum.is_empty() && sum.bytes().all(|byte| byte.is_ascii_hexdigit()))
+    }
 }
 
 /// Whether a process has a file open, or may: its maker has until it is finished.
@@ -209,15 +216,6 @@ impl Drop for Folders {
         }
         // One with files in it is in use. Of a peer that has joined there is a node before there is a service.
         let _ = self.folders.iter().rev().try_for_each(fs::remove_dir);
-    }
-}
-
-impl Folders {
-    /// Whether a file of shared memory counts the nodes of this domain: `PREFIX`, a checksum, a name.
-    fn is_counter(&self, name: &str) -> bool {
-        let middle = name.strip_prefix(&self.prefix).and_then(|name| name.strip_suffix(&self.counter));
-        let checksum = middle.and_then(|middle| middle.split_once('_'));
-        checksum.is_some_and(|(sum, _)| !sum.is_empty() && sum.bytes().all(|byte| byte.is_ascii_hexdigit()))
     }
 }
 
