@@ -51,11 +51,10 @@ impl RecordArguments {
     }
 
     /// Refuses a recording of what has none.
-    pub fn require_none(&self, what: &'static str) -> Result<(), RecordError> {
-        match &self.record {
-            None => Ok(()),
-            Some(_) => Err(RecordError::NotRecorded { what }),
-        }
+    pub fn require_none(&self, what: &str) -> Result<(), RecordError> {
+        let refused =
+            || format!("--record: {what} is not recorded\n  help: leave --record out, or use ROS 2");
+        self.record.as_ref().map_or(Ok(()), |_| Err(RecordError::Refused(refused())))
     }
 }
 

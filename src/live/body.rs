@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::command::Command;
 use super::history::{History, Source};
-use super::session::{Broken, Frame, Refused, Session, Viewer};
+use super::session::{Broken, Frame, Refused, Session, Viewer, displacements};
 use crate::continuum::mechanics::Stresses;
 use crate::engine::{Before, Engine};
 use crate::export::report::RunRecorder;
@@ -186,8 +186,7 @@ impl Session for Body {
     fn frame(&self, wanted: &[bool]) -> Frame {
         let engine = &self.history.now.engine;
         let (present, reference) = (engine.present(), &engine.body().reference);
-        let moved = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(n, t)| (n - t) as f32).collect();
-        let mut places: [Vec<f32>; 2] = [moved(&present.x, &reference.x), moved(&present.y, &reference.y)];
+        let mut places = displacements(present, reference);
         // A hand is not to wait for the next step, least of all where the body stands still.
         for (i, by) in self.history.now.ahead() {
             let (now, then) = (present.get(i), reference.get(i));
@@ -195,10 +194,8 @@ impl Session for Body {
         }
         let of = |name: &str| -> Vec<f32> {
             if name == "von_mises" {
-                return Stresses::von_mises_of_cells(engine)
-                    .into_iter()
-                    .map(|stress| stress as f32)
-                    .collect();
+                let stresses = Stresses::von_mises_of_cells(engine).into_iter();
+                return stresses.map(|stress| stress as f32).collect();
             }
             let value = |i: usize| match name {
                 "pe2" => engine.pe2(i),

@@ -55,7 +55,6 @@ pub struct Conductor {
     /// Mean time of a step, and of encoding a frame \[ms\].
     step_time: f64,
     frame_time: f64,
-    /// Steps a second in the last while.
     pace: Pace,
     number: u64,
     lineage: u64,

@@ -33,7 +33,6 @@ pub struct Server {
     token: String,
 }
 
-/// State that the threads of connections share.
 struct Shared {
     token: String,
     port: u16,

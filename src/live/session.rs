@@ -7,6 +7,7 @@ use serde_json::Value;
 use super::command::Command;
 use super::monitor::Monitor;
 use crate::export::report::view::View;
+use crate::flock::vectors::Vectors;
 use crate::scene::{Place, Problem, SceneError};
 
 /// A viewer, by the number of its connection.
@@ -24,6 +25,12 @@ pub struct Frame {
     pub places: [Vec<f32>; 2],
     /// Other quantities, those alone that a viewer looks at, shape \[channels\]\[count\].
     pub channels: Vec<Option<Vec<f32>>>,
+}
+
+/// Displacements along x and y, for [`Frame::places`].
+pub(super) fn displacements(present: &Vectors, reference: &Vectors) -> [Vec<f32>; 2] {
+    let moved = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(n, t)| (n - t) as f32).collect();
+    [moved(&present.x, &reference.x), moved(&present.y, &reference.y)]
 }
 
 /// Why something was not done.

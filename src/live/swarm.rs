@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::command::{Command, Fault};
 use super::history::{self, History, Source};
-use super::session::{Frame, Refused, Session, Viewer};
+use super::session::{Frame, Refused, Session, Viewer, displacements};
 use crate::export::report::flight::{FlightRecorder, from_places};
 use crate::export::report::view::View;
 use crate::flock::role::Role;
@@ -364,11 +364,10 @@ pub(super) fn frame(
         "target_dy" => to_target(m, 1),
         _ => measures.strain[m].map_or(f64::NAN, |strain| strain.largest()),
     };
-    let moved = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(n, t)| (n - t) as f32).collect();
     let channel = |name: &str| (0..places.len()).map(|m| of(name, m) as f32).collect();
     Frame {
         clock,
-        places: [moved(&places.x, &start.x), moved(&places.y, &start.y)],
+        places: displacements(places, start),
         channels: CHANNELS[..7].iter().map(|name| Some(channel(name))).collect(),
     }
 }

@@ -1,5 +1,7 @@
 //! The definitions of the messages as text: recordings carry them, so that readers can decode the payloads.
 
+use std::collections::VecDeque;
+
 /// Of the standard messages (ROS 2 Jazzy), without their comments, by `package/Name`.
 pub const STANDARD: &[(&str, &str)] = &[
     ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec"),
@@ -115,19 +117,23 @@ pub const OWN: &[(&str, &str)] = &[
 /// has no definition here.
 pub fn concatenated(name: &str) -> Option<String> {
     let mut text = trimmed(definition(name)?);
-    let mut named = vec![name.to_owned()];
-    let mut open = contained(name);
-    while !open.is_empty() {
-        let next = open.remove(0);
-        if named.contains(&next) {
-            continue;
-        }
-        let rule = "=".repeat(80);
-        text += &format!("{rule}\nMSG: {next}\n{}", trimmed(definition(&next)?));
-        open.extend(contained(&next));
-        named.push(next);
+    for part in all_contained(name) {
+        text += &format!("{}\nMSG: {part}\n{}", "=".repeat(80), trimmed(definition(&part)?));
     }
     Some(text)
+}
+
+/// All messages that a message contains, each once: its own fields before those of fields.
+pub(super) fn all_contained(name: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    let mut open = VecDeque::from(contained(name));
+    while let Some(next) = open.pop_front() {
+        if !found.contains(&next) {
+            open.extend(contained(&next));
+            found.push(next);
+        }
+    }
+    found
 }
 
 pub(super) fn definition(name: &str) -> Option<&'static str> {
@@ -139,7 +145,7 @@ pub(super) fn trimmed(text: &str) -> String {
 }
 
 /// The messages that are fields of a message; types without a package are of its own.
-pub(super) fn contained(name: &str) -> Vec<String> {
+fn contained(name: &str) -> Vec<String> {
     let own = name.split('/').next().unwrap_or_default();
     let kind = |line: &str| {
         let kind = line.split('#').next()?.split_whitespace().next()?;

@@ -109,6 +109,14 @@ impl Names {
         if name.starts_with(['/', '~']) { self.topic(&name) } else { self.topic(&join(&self.fleet, &name)) }
     }
 
+    /// As [`Names::fleet_topic`] for a robot, whose name `{name}` stands for.
+    ///
+    /// # Errors
+    /// A name that ROS 2 does not allow, as written or after remapping.
+    pub fn robot_topic(&self, pattern: &str, robot: &str) -> Result<String, NameError> {
+        self.fleet_topic(&pattern.replace("{name}", robot))
+    }
+
     /// As [`Names::topic`] for a service.
     ///
     /// # Errors
@@ -243,20 +251,4 @@ pub(crate) fn check_token(token: &str) -> Result<(), String> {
         return Err(format!("`{token}` contains two underscores in a row"));
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_fully_qualified_names_pass() {
-        for good in ["/a", "/robot_1/pose", "/A/b2/c_d"] {
-            assert_eq!(check_full_name("topic name", good), Ok(()), "{good}");
-        }
-        for bad in ["", "/", "a", "/a/", "//a", "/a//b", "/1a", "/a b", "/a-b", "~/a", "/{a}", "/a__b", "/é"]
-        {
-            assert!(check_full_name("topic name", bad).is_err(), "{bad}");
-        }
-    }
 }

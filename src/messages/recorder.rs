@@ -7,6 +7,7 @@ use crate::messages::names::{NameError, Names};
 use crate::messages::std_msgs::Header;
 use crate::messages::wire::encode;
 use crate::swarm::control::Control;
+use crate::swarm::safety::SafetyError;
 
 /// Topic of [`LoopEvent`]s, below the node's name.
 pub(crate) const EVENTS: &str = "~/events";
@@ -66,12 +67,10 @@ impl MessageRecorder {
     fn copy<M: Message>(&mut self, topic: &str, message: &M, [time, published]: [f64; 2], reliable: bool) {
         self.payload.clear();
         self.payload.extend(ENCAPSULATION);
-        let mut body = Vec::new();
-        if let Err(error) = encode(message, &mut body) {
+        if let Err(error) = encode(message, &mut self.payload) {
             tracing::warn!("{topic} is not recorded: {error}");
             return;
         }
-        self.payload.extend(body);
         let (package, name, payload) = (M::PACKAGE, M::NAME, &self.payload[..]);
         (self.sink)(&RecordedMessage { topic, package, name, payload, reliable, time, published });
     }
@@ -107,7 +106,10 @@ pub fn parameters(control: &Control) -> [(&'static str, f64); 6] {
 }
 
 /// Gives a loop a value as [`parameters`] names it; false for a name or a value that is none.
-pub fn set_parameter(control: &mut Control, name: &str, value: f64) -> bool {
+///
+/// # Errors
+/// A limit that is none.
+pub fn set_parameter(control: &mut Control, name: &str, value: f64) -> Result<bool, SafetyError> {
     let mut limits = control.limits().clone();
     match name {
         "period" if value > 0.0 => control.set_period(value),
@@ -116,7 +118,10 @@ pub fn set_parameter(control: &mut Control, name: &str, value: f64) -> bool {
         "speed_limit" => limits.speed = value,
         "acceleration_limit" => limits.acceleration = value,
         "clearance" => limits.clearance = value,
-        _ => return false,
+        _ => return Ok(false),
     }
-    limits == *control.limits() || control.set_limits(limits).is_ok()
+    if limits != *control.limits() {
+        control.set_limits(limits)?;
+    }
+    Ok(true)
 }

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 use sha2::{Digest, Sha256};
 
-use super::definitions::{contained, definition, trimmed};
+use super::definitions::{all_contained, definition, trimmed};
 use super::diagnostic_msgs::KeyValue;
 use super::{messages, services, structs};
 
@@ -79,14 +79,7 @@ structs! {
 impl TypeDescription {
     /// The description of a message, `package/Name`; `None` for one without a definition here.
     pub fn of(name: &str) -> Option<Self> {
-        let mut names = Vec::new();
-        let mut open = contained(name);
-        while let Some(next) = open.pop() {
-            if !names.contains(&next) {
-                open.extend(contained(&next));
-                names.push(next);
-            }
-        }
+        let mut names = all_contained(name);
         names.sort();
         Some(Self {
             type_description: individual(name)?,

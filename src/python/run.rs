@@ -40,8 +40,9 @@ pub(super) fn run(
 ) -> PyResult<Run> {
     let source = Source::scene(scene, set)?;
     let every = every.map(|every| positive("every", every)).transpose()?;
-    let done = beside(py, progress, move |progress| run_source(&source, every, progress))??;
-    Run::new(py, done)
+    let (scene, outcome, frames) =
+        beside(py, progress, move |progress| run_source(&source, every, progress))??;
+    Run::new(py, scene, outcome, frames)
 }
 
 /// A count that is at least 1.
@@ -50,38 +51,11 @@ pub(super) fn positive(name: &str, count: i64) -> PyResult<usize> {
     found.ok_or_else(|| PyValueError::new_err(format!("{name} = {count}: give a number of steps, 1 or more")))
 }
 
-/// A run at its end.
-struct Done {
-    scene: Scene,
-    outcome: Outcome,
-    frames: Frames,
-}
-
-/// The reasons for which there is no run to return.
-enum Failure {
-    Scene(SceneError),
-    /// Frames kept, and particles in each.
-    Memory(usize, usize),
-}
-
-impl From<SceneError> for Failure {
-    fn from(error: SceneError) -> Self {
-        Failure::Scene(error)
-    }
-}
-
-impl From<Failure> for PyErr {
-    fn from(failure: Failure) -> Self {
-        match failure {
-            Failure::Scene(error) => error.into(),
-            Failure::Memory(frames, particles) => PyMemoryError::new_err(format!(
-                "{frames} frames of {particles} particles are kept and no more fit into memory: raise `every`"
-            )),
-        }
-    }
-}
-
-fn run_source(source: &Source, every: Option<usize>, progress: &Progress) -> Result<Done, Failure> {
+fn run_source(
+    source: &Source,
+    every: Option<usize>,
+    progress: &Progress,
+) -> Result<(Scene, Outcome, Frames), SceneError> {
     let scene = source.chosen(progress)?;
     let plan = plan(&scene)?;
     let looks = Looks::new(&plan, false);
@@ -89,10 +63,7 @@ fn run_source(source: &Source, every: Option<usize>, progress: &Progress) -> Res
     let outcome = run_to_equilibrium_watched(&scene, plan, &mut watcher)?;
     let mut frames = watcher.frames;
     frames.keep(&outcome.engine);
-    if frames.is_full {
-        return Err(Failure::Memory(frames.steps.len(), outcome.engine.present().len()));
-    }
-    Ok(Done { scene, outcome, frames })
+    Ok((scene, outcome, frames))
 }
 
 /// Ends the scene's solver when the wait for it ends.
@@ -190,12 +161,19 @@ pub(super) struct Run {
 }
 
 impl Run {
-    fn new(py: Python<'_>, done: Done) -> PyResult<Self> {
-        let Done { scene, outcome, frames: Frames { mut steps, mut places, .. } } = done;
+    fn new(py: Python<'_>, scene: Scene, outcome: Outcome, frames: Frames) -> PyResult<Self> {
+        let Frames { mut steps, mut places, is_full } = frames;
+        let particles = outcome.engine.present().len();
+        if is_full {
+            return Err(PyMemoryError::new_err(format!(
+                "{} frames of {particles} particles are kept and no more fit into memory: raise `every`",
+                steps.len()
+            )));
+        }
         // Room that was reserved for frames that did not come.
         steps.shrink_to_fit();
         places.shrink_to_fit();
-        let shape = [steps.len(), outcome.engine.present().len(), 2];
+        let shape = [steps.len(), particles, 2];
         Ok(Self {
             name: scene.name.clone(),
             unit: scene.unit().to_owned(),

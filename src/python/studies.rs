@@ -76,7 +76,10 @@ pub(super) fn compare(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Comparison> {
     let source = Source::scene(scene, set)?;
-    let effort = Effort { target: part_of_one(truth_error)?, ..Effort::default() };
+    let mut effort = Effort::default();
+    if let Some(truth_error) = truth_error {
+        effort.target = part_of_one(truth_error)?;
+    }
     let (scene, compared) = beside(py, progress, move |progress| {
         let scene = source.chosen(progress)?;
         let compared =
@@ -86,15 +89,12 @@ pub(super) fn compare(
     Comparison::new(py, scene, compared)
 }
 
-fn part_of_one(truth_error: Option<f64>) -> PyResult<f64> {
-    match truth_error {
-        None => Ok(Effort::default().target),
-        Some(error) if error > 0.0 && error < 1.0 => Ok(error),
-        Some(error) => {
-            let message = format!("truth_error = {error}: give a number more than 0 and less than 1");
-            Err(PyValueError::new_err(message))
-        }
+fn part_of_one(truth_error: f64) -> PyResult<f64> {
+    if truth_error > 0.0 && truth_error < 1.0 {
+        return Ok(truth_error);
     }
+    let message = format!("truth_error = {truth_error}: give a number more than 0 and less than 1");
+    Err(PyValueError::new_err(message))
 }
 
 /// A rule beside the truth, which is that of finite elements.

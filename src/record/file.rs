@@ -66,7 +66,8 @@ impl Recording {
     /// # Errors
     /// A file of this name, without `force`; with it, one that is no MCAP file; a folder that cannot be written to.
     pub fn create(path: &Path, about: &About, force: bool) -> Result<Self, RecordError> {
-        let name = path.file_name().ok_or_else(|| RecordError::Unnamed(path.to_owned()))?;
+        let unnamed = "does not name a file that could be made: give it a name that ends in .mcap";
+        let name = path.file_name().ok_or_else(|| refused(path, unnamed))?;
         require_free(path, force)?;
         let io = RecordError::io;
         if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
@@ -183,11 +184,19 @@ impl Recording {
 fn require_free(path: &Path, force: bool) -> Result<(), RecordError> {
     let Ok(found) = path.symlink_metadata() else { return Ok(()) };
     if !force || !found.is_file() {
-        return Err(RecordError::Taken(path.to_owned()));
+        return Err(refused(path, "exists: remove it, or give the recording another name"));
     }
     let mut magic = [0; mcap::MAGIC.len()];
     let begin = File::open(path).and_then(|mut file| file.read_exact(&mut magic));
-    if begin.is_ok() && magic == *mcap::MAGIC { Ok(()) } else { Err(RecordError::NotOurs(path.to_owned())) }
+    if begin.is_ok() && magic == *mcap::MAGIC {
+        return Ok(());
+    }
+    let why = "is no MCAP file: --force replaces recordings only\n  help: move it away, or give the recording another name";
+    Err(refused(path, why))
+}
+
+fn refused(path: &Path, why: &str) -> RecordError {
+    RecordError::Refused(format!("{} {why}", path.display()))
 }
 
 /// A new file `NAME.part`, or `NAME.2.part` and so on: a killed program may have left its recording in the first.

@@ -15,7 +15,7 @@ use crate::messages::std_msgs::Header;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::RawPoseType;
 use crate::swarm::control::Control;
-use crate::swarm::transport::Received;
+use crate::swarm::transport::{Received, target_of};
 use crate::swarm::watch::{Pose, Range};
 
 /// States and markers a second, as of a node with default parameters \[Hz\].
@@ -28,21 +28,18 @@ pub struct FlightMessages {
     /// Fully qualified name of the node.
     node: String,
     swarm: Swarm,
-    topics: Topics,
+    /// Topics of the robots, by number.
+    poses: Vec<String>,
+    ranges: Vec<String>,
+    targets: Vec<String>,
+    /// Topics of the node.
+    state: String,
+    markers: String,
+    diagnostics: String,
     heard: Vec<(usize, Pose)>,
     measured: Vec<Range>,
     statistics: Statistics,
     begun: bool,
-}
-
-/// Names of topics; of robots by number.
-struct Topics {
-    poses: Vec<String>,
-    ranges: Vec<String>,
-    targets: Vec<String>,
-    state: String,
-    markers: String,
-    diagnostics: String,
 }
 
 impl FlightMessages {
@@ -54,18 +51,16 @@ impl FlightMessages {
         let [poses, targets] = single_topics(raw);
         let of_robots = |pattern: &str| -> Result<Vec<String>, NameError> {
             let all = control.formation().names.iter();
-            all.map(|name| names.fleet_topic(&pattern.replace("{name}", name))).collect()
+            all.map(|name| names.robot_topic(pattern, name)).collect()
         };
         Ok(Self {
             recorder: MessageRecorder::new(&names, &raw.frame_id, sink)?,
-            topics: Topics {
-                poses: of_robots(&poses)?,
-                ranges: of_robots(&raw.ranges_topic)?,
-                targets: of_robots(&targets)?,
-                state: names.topic("~/state")?,
-                markers: names.topic("~/markers")?,
-                diagnostics: names.topic("/diagnostics")?,
-            },
+            poses: of_robots(&poses)?,
+            ranges: of_robots(&raw.ranges_topic)?,
+            targets: of_robots(&targets)?,
+            state: names.topic("~/state")?,
+            markers: names.topic("~/markers")?,
+            diagnostics: names.topic("/diagnostics")?,
             node: names.fully_qualified(),
             swarm: swarm.clone(),
             heard: Vec::new(),
@@ -93,7 +88,7 @@ impl FlightMessages {
         let measured = std::mem::take(&mut self.measured);
         let names = &control.formation().names;
         for (observer, message) in ranges::messages(&measured, names, &self.swarm.raw.node.frame_id) {
-            self.recorder.take_received(&self.topics.ranges[observer], &message, [now; 2]);
+            self.recorder.take_received(&self.ranges[observer], &message, [now; 2]);
         }
         for (member, pose) in std::mem::take(&mut self.heard) {
             self.pose(member, &pose, now);
@@ -101,30 +96,30 @@ impl FlightMessages {
         self.recorder.event(now, LoopEvent::TICK, "", &[now]);
         let header =
             || Header { stamp: Time::from_seconds(now), frame_id: self.swarm.raw.node.frame_id.clone() };
-        for (member, topic) in self.topics.targets.iter().enumerate() {
-            if let Some(message) = target::of_member(control, member, header()) {
-                self.recorder.take(topic, &message, [now; 2]);
+        for (member, topic) in self.targets.iter().enumerate() {
+            if let Some(target) = target_of(control, member) {
+                self.recorder.take(topic, &target::message(&target, header()), [now; 2]);
             }
         }
         // A simulated tick takes no time of the flight, and what it takes of ours is another every time.
         self.statistics.tick(0.0);
         if self.statistics.is_due(diagnostics::STATE, now, STATES) {
             let message = state::message(control, &self.swarm.name, header(), 0.0);
-            self.recorder.take(&self.topics.state, &message, [now; 2]);
+            self.recorder.take(&self.state, &message, [now; 2]);
             let message = markers::message(control, &self.swarm.raw, &header());
-            self.recorder.take(&self.topics.markers, &message, [now; 2]);
+            self.recorder.take(&self.markers, &message, [now; 2]);
         }
         if self.statistics.is_due(diagnostics::DIAGNOSTICS, now, DIAGNOSTICS) {
             let names = [self.node.as_str(), &self.swarm.name];
             let message = self.statistics.message(control, names, header(), 0, true, &[]);
-            self.recorder.take(&self.topics.diagnostics, &message, [now; 2]);
+            self.recorder.take(&self.diagnostics, &message, [now; 2]);
         }
     }
 
     fn pose(&mut self, member: usize, pose: &Pose, now: f64) {
         let raw = &self.swarm.raw.node;
         let (header, pose) = said(pose, &raw.frame_id);
-        let (recorder, topic, times) = (&mut self.recorder, &self.topics.poses[member], [now; 2]);
+        let (recorder, topic, times) = (&mut self.recorder, &self.poses[member], [now; 2]);
         match raw.pose_type {
             RawPoseType::PoseStamped | RawPoseType::PoseArray => {
                 recorder.take_received(topic, &PoseStamped { header, pose }, times);

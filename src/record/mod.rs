@@ -28,15 +28,9 @@ pub use shared::Shared;
 /// Error writing or reading a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// A recording would replace a file that it may not.
-    #[error("{} exists: remove it, or give the recording another name", .0.display())]
-    Taken(PathBuf),
-    /// A recording would replace a file that is none.
-    #[error(
-        "{} is no MCAP file: --force replaces recordings only\n  help: move it away, or give the recording another name",
-        .0.display()
-    )]
-    NotOurs(PathBuf),
+    /// A recording that cannot be made where it is asked for, or says too little to be replayed, with the remedy.
+    #[error("{0}")]
+    Refused(String),
     /// Another program has put a file where the recording belongs while it was written.
     #[error("{} was taken meanwhile: the recording is complete and kept in {}", .path.display(), .part.display())]
     Kept {
@@ -44,15 +38,6 @@ pub enum RecordError {
         part: PathBuf,
         /// Where it belongs.
         path: PathBuf,
-    },
-    /// A path that ends in no file name.
-    #[error("{} does not name a file that could be made: give it a name that ends in .mcap", .0.display())]
-    Unnamed(PathBuf),
-    /// A run that cannot be recorded.
-    #[error("--record: {what} is not recorded\n  help: leave --record out, or use ROS 2")]
-    NotRecorded {
-        /// The subject of the recording.
-        what: &'static str,
     },
     /// The system refuses a file.
     #[error("cannot {action} {}: {source}", .path.display())]
@@ -79,32 +64,6 @@ pub enum RecordError {
         path: PathBuf,
         /// The error of the MCAP library.
         source: mcap::McapError,
-    },
-    /// A recording that carries no swarm file.
-    #[error(
-        "{} does not say which swarm flew\n  help: name the swarm file with --swarm; only flockform's own recordings of a swarm carry it (those of a body are for viewers: `flockform run` makes the run again)",
-        .0.display()
-    )]
-    NoSwarm(PathBuf),
-    /// A recording that says too little to be replayed.
-    #[error("{}: {what}\n  help: {help}", .path.display())]
-    Unusable {
-        /// Path of the file.
-        path: PathBuf,
-        /// The missing part.
-        what: String,
-        /// The remedy.
-        help: String,
-    },
-    /// What the file lacks because it is damaged.
-    #[error("{} breaks off: {damage}; of what comes before that: {error}", .path.display())]
-    BreaksOff {
-        /// Path of the file.
-        path: PathBuf,
-        /// The damage.
-        damage: String,
-        /// The error that the rest of the file gives.
-        error: Box<RecordError>,
     },
     /// The swarm of a recording, with the overrides, is none.
     #[error("{0}")]

@@ -130,14 +130,13 @@ impl Reader {
         described
     }
 
-    /// An error of what can be read, with the damage that ends it, if the file is damaged: what is lacking may have come after.
-    pub(super) fn after_damage(&self, error: RecordError) -> RecordError {
-        match self.each(&mut |_| {}) {
-            Some(damage) => {
-                RecordError::BreaksOff { path: self.path.clone(), damage, error: Box::new(error) }
-            }
-            None => error,
-        }
+    /// Refuses what can be read, with the damage that ends it, if the file is damaged: what is lacking may have come after.
+    pub(super) fn refused(&self, why: &str) -> RecordError {
+        let path = self.path.display();
+        RecordError::Refused(match self.each(&mut |_| {}) {
+            Some(damage) => format!("{path} breaks off: {damage}; of what comes before that: {path}{why}"),
+            None => format!("{path}{why}"),
+        })
     }
 
     /// Shows every CDR message to `see`, in the order of the file, until it is damaged or ends. Returns what is

@@ -96,8 +96,13 @@ impl Report {
 /// A recording without a swarm; what the overrides make of it.
 pub fn recorded_swarm(reader: &Reader, set: &[String]) -> Result<Swarm, RecordError> {
     let described = reader.described();
-    let nameless = || RecordError::NoSwarm(reader.path().to_owned());
-    let text = described.swarm.ok_or_else(nameless).map_err(|error| reader.after_damage(error))?;
+    let nameless = || {
+        reader.refused(
+            " does not say which swarm flew\n  help: name the swarm file with --swarm; only flockform's own recordings of a \
+             swarm carry it (those of a body are for viewers: `flockform run` makes the run again)",
+        )
+    };
+    let text = described.swarm.ok_or_else(nameless)?;
     let of = |key: &str| described.metadata.get(key).cloned();
     let given: Vec<String> = of("set").and_then(|set| serde_json::from_str(&set).ok()).unwrap_or_default();
     let (name, folder) = (of("name").unwrap_or_default(), of("folder").map(PathBuf::from));
@@ -117,10 +122,7 @@ pub fn replay(reader: &Reader, swarm: &Swarm, tolerance: f64) -> Result<Report, 
         // Of a file that breaks off, the last tick may not be whole.
         replay.compare();
     }
-    let unusable = |what: &str, help: &str| {
-        let (path, what, help) = (reader.path().to_owned(), what.to_owned(), help.to_owned());
-        Err(reader.after_damage(RecordError::Unusable { path, what, help }))
-    };
+    let unusable = |what: &str, help: &str| Err(reader.refused(&format!(": {what}\n  help: {help}")));
     if let Some(refusal) = replay.refusal {
         return unusable(&refusal, "give the swarm file that was flown with --swarm");
     }
@@ -312,13 +314,9 @@ impl Replay {
         }
         match (event.kind, &event.values[..]) {
             (LoopEvent::TICK, &[now]) => self.tick(now),
-            (LoopEvent::ACTIVE, _) => {
-                self.active = true;
-                self.control.set_active(true);
-            }
-            (LoopEvent::INACTIVE, _) => {
-                self.active = false;
-                self.control.set_active(false);
+            (LoopEvent::ACTIVE | LoopEvent::INACTIVE, _) => {
+                self.active = event.kind == LoopEvent::ACTIVE;
+                self.control.set_active(self.active);
             }
             (LoopEvent::EMERGENCY_STOP, _) => self.control.emergency_stop(),
             (LoopEvent::RESUME, _) => {
@@ -362,7 +360,7 @@ impl Replay {
         if !self.begun && is_changed_since {
             return;
         }
-        if !set_parameter(&mut self.control, name, value) {
+        if set_parameter(&mut self.control, name, value) != Ok(true) {
             self.refusal.get_or_insert(format!("parameter {name} = {value} cannot be set"));
         }
     }
@@ -417,8 +415,7 @@ impl Replay {
         }
         self.control.tick(now);
         for (member, today) in self.today.iter_mut().enumerate() {
-            let target = self.control.target(member).filter(|_| self.active && self.mine[member]);
-            *today = target;
+            *today = self.control.target(member).filter(|_| self.active && self.mine[member]);
         }
     }
 
@@ -460,10 +457,11 @@ fn taken_over(reader: &Reader, text: &str) -> Result<ControlSnapshot, RecordErro
     /// More than a loop runs through; a body that moves by itself is taken through all of them.
     const MOST_PERIODS: u64 = 100_000_000;
     let state: Option<ControlSnapshot> = serde_json::from_str(text).ok();
-    state.filter(|state| state.periods() <= MOST_PERIODS).ok_or_else(|| RecordError::Unusable {
-        path: reader.path().to_owned(),
-        what: format!("its `{TAKEN_OVER}` is no state of a loop"),
-        help: "give a recording as --record has written it".to_owned(),
+    state.filter(|state| state.periods() <= MOST_PERIODS).ok_or_else(|| {
+        RecordError::Refused(format!(
+            "{}: its `{TAKEN_OVER}` is no state of a loop\n  help: give a recording as --record has written it",
+            reader.path().display()
+        ))
     })
 }
 

@@ -81,7 +81,7 @@ pub(super) fn of_robots(
     }
     let [poses, targets] = single_topics(raw);
     for (m, name) in control.formation().names.iter().enumerate() {
-        let of = |pattern: &str| names.fleet_topic(&pattern.replace("{name}", name));
+        let of = |pattern: &str| names.robot_topic(pattern, name);
         topics.insert(of(&poses)?, Heard::Pose(m));
         topics.insert(of(&raw.leader_topic)?, Heard::Leader(m));
         topics.insert(of(&raw.ranges_topic)?, Heard::Ranges(m));

@@ -82,6 +82,8 @@ pub struct Link {
     frames: Vec<String>,
     targets: Targets,
     poses: Poses,
+    /// Of the first robot's poses and targets.
+    first_topics: [String; 2],
     /// By robot; empty in a swarm without ranges.
     ranges: Vec<Publisher<Ranges>>,
     names: Vec<String>,
@@ -105,14 +107,6 @@ enum Targets {
 }
 
 impl Targets {
-    /// The first topic.
-    fn topic(&self) -> &str {
-        match self {
-            Self::Stamped(all) => all.first().map_or("", Subscription::topic),
-            Self::Array(topic) => topic.topic(),
-        }
-    }
-
     /// Of each topic, whether those that sent targets on it have taken leave.
     fn left(&self) -> Vec<Option<bool>> {
         match self {
@@ -133,19 +127,6 @@ enum Poses {
     Array(Box<Publisher<PoseArray>>, Vec<geometry_msgs::Pose>),
 }
 
-impl Poses {
-    /// The topic of the first robot.
-    fn first_topic(&self) -> &str {
-        let first = match self {
-            Poses::Stamped(all) => all.first().map(Publisher::topic),
-            Poses::WithCovariance(all) => all.first().map(Publisher::topic),
-            Poses::Odometry(all) => all.first().map(Publisher::topic),
-            Poses::Array(topic, _) => Some(topic.topic()),
-        };
-        first.unwrap_or_default()
-    }
-}
-
 impl Link {
     /// # Errors
     /// An obstacle in the ROS arguments or the network.
@@ -164,7 +145,9 @@ impl Link {
         let nodes: Vec<Node> = owners.iter().map(|names| edge.named_node(names)).collect::<Result<_, _>>()?;
         // The one node is the owner of all.
         let owner = |m: usize| m.min(nodes.len() - 1);
-        let of = |pattern: &str, m: usize| topic(&owners[owner(m)], pattern, &formation.names[m]);
+        let of = |pattern: &str, m: usize| -> Result<_, NodeError> {
+            Ok(owners[owner(m)].robot_topic(pattern, &formation.names[m])?)
+        };
         check_topics(&swarm.raw, formation, &of)?;
         let target = |m: usize| -> Result<_, NodeError> {
             Ok(nodes[owner(m)].subscription(&of(&raw.target_topic, m)?, Quality::reliable(1))?.steady())
@@ -206,6 +189,7 @@ impl Link {
             frames,
             targets,
             poses,
+            first_topics: [of(&raw.pose_topic, 0)?, of(&raw.target_topic, 0)?],
             ranges,
             names,
             clock,
@@ -243,8 +227,7 @@ impl RobotNodes {
     pub fn reached_at(&self) -> String {
         let (first, others) = (&self.link.nodes[0], self.link.nodes.len() - 1);
         let others = if others == 0 { String::new() } else { format!(" and {others} nodes like it") };
-        let targets = self.link.targets.topic();
-        let poses = self.link.poses.first_topic();
+        let [poses, targets] = &self.link.first_topics;
         format!("{}{others} on {}; poses to {poses}, targets from {targets}", first.name(), first.options())
     }
 
@@ -422,7 +405,6 @@ fn frame_of(raw: &RawNode, fleet: &str, name: &str) -> String {
     format!("{prefix}{name}/base_link")
 }
 
-/// Name of the parameter by which the robots publish `/clock`.
 const PUBLISH_CLOCK: &str = "publish_clock";
 
 /// The parameters of the robots, with what the arguments give the node of this name.
@@ -441,10 +423,6 @@ fn owners(formation: &Formation, arguments: &RosArguments, layout: Layout) -> Re
             formation.names.iter().map(|robot| Ok(arguments.names("robot", "/")?.of_robot(robot)?)).collect()
         }
     }
-}
-
-fn topic(names: &Names, pattern: &str, name: &str) -> Result<String, NodeError> {
-    Ok(names.fleet_topic(&pattern.replace("{name}", name))?)
 }
 
 /// Refuses topics of the robots with two uses.

@@ -1,6 +1,5 @@
 //! A service's two sides: a writer that fills slices of shared memory in place, a reader that borrows them.
 
-use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut};
 use std::rc::Rc;
 use std::time::Duration;
@@ -71,15 +70,15 @@ struct Opened<T: Payload> {
 
 /// `flockform/SPACE/LEAF`.
 pub(crate) fn service_name(space: &str, leaf: &str) -> Result<String, ShmError> {
-    let refused = |reason| ShmError::Name { name: space.to_owned(), reason };
-    if !(1..=64).contains(&space.len()) {
-        return Err(refused("its length"));
-    }
     let is_allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
-    if !space.chars().all(is_allowed) {
-        return Err(refused("a character in it"));
-    }
-    Ok(format!("flockform/{space}/{leaf}"))
+    let fault = match space {
+        _ if !(1..=64).contains(&space.len()) => "its length",
+        _ if !space.chars().all(is_allowed) => "a character in it",
+        _ => return Ok(format!("flockform/{space}/{leaf}")),
+    };
+    Err(ShmError::Refused(format!(
+        "{space:?} is no name of a service: {fault}\n  help: give 1 to 64 letters, digits, `-`, `_` and `.`"
+    )))
 }
 
 impl<T: Payload> Opened<T> {
@@ -411,7 +410,6 @@ pub struct Reader<T: Payload> {
     subscriber: Subscriber<ipc::Service, [T], Header>,
     bell: Bell,
     refused: std::cell::Cell<u64>,
-    kind: PhantomData<T>,
 }
 
 impl<T: Payload> Reader<T> {
@@ -427,7 +425,7 @@ impl<T: Payload> Reader<T> {
         let listener = listener.map_err(|error| opened.port("reader", error, capacity.readers))?;
         let Opened { name: service, .. } = opened;
         let refused = std::cell::Cell::new(0);
-        Ok(Self { service, subscriber, bell: Rc::new(listener), refused, kind: PhantomData })
+        Ok(Self { service, subscriber, bell: Rc::new(listener), refused })
     }
 
     /// The bell that rings when a slice arrives.
@@ -435,10 +433,11 @@ impl<T: Payload> Reader<T> {
         Rc::clone(&self.bell)
     }
 
-    /// Stills the bell: to be called before the slices are taken, so that none is slept through.
-    pub fn still(&self) {
-        // An error would leave the bell ringing: the slices are taken all the same.
+    /// Stills the bell and takes what has arrived, oldest first, up to as many slices as must not hold a loop.
+    pub fn arrived(&self) -> impl Iterator<Item = Slice<T>> + '_ {
+        // Before they are taken, so that none is slept through. An error would leave the bell ringing: they are taken all the same.
         let _ = self.bell.try_wait(|_| ());
+        std::iter::from_fn(|| self.take()).take(MOST_AT_ONCE)
     }
 
     /// The oldest slice not yet taken, borrowed until it is dropped.
@@ -460,7 +459,7 @@ impl<T: Payload> Reader<T> {
     }
 
     /// Sleeps until a slice arrives, for so long at most; whether one may have: the bell still rings for slices that
-    /// were taken since without [`Reader::still`].
+    /// were taken since without [`Reader::arrived`].
     pub fn wait(&self, longest: Duration) -> bool {
         self.bell.timed_wait(|_| (), longest).is_ok_and(|rings| rings > 0)
     }
@@ -477,7 +476,7 @@ impl<T: Payload> Reader<T> {
 }
 
 /// Slices taken in one call at most: a flood must not hold a loop.
-pub(crate) const MOST_AT_ONCE: usize = 1024;
+const MOST_AT_ONCE: usize = 1024;
 
 /// A slice in shared memory, as its writer filled it. Its place is free again when it is dropped.
 #[derive(Debug)]

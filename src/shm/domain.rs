@@ -1,5 +1,7 @@
 //! Which processes meet: those of one domain on one computer.
 
+use std::fmt::Display;
+
 use iceoryx2::prelude::{
     CallbackProgression, Config, FileName, LogLevel, Node, NodeBuilder, NodeName, NodeState,
 };
@@ -45,7 +47,12 @@ impl Domain {
     /// # Errors
     /// A name that is none.
     pub fn named(name: &str) -> Result<Self, ShmError> {
-        let refused = || ShmError::Domain { variable: VARIABLE, name: name.to_owned() };
+        let refused = || {
+            ShmError::Refused(format!(
+                "{VARIABLE}={name:?} is no domain\n  help: give 1 to 32 letters, digits, `-` and `_`, or unset it for \
+                 iceoryx2's own"
+            ))
+        };
         let is_allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
         if !(1..=32).contains(&name.len()) || !name.chars().all(is_allowed) {
             return Err(refused());
@@ -62,8 +69,13 @@ impl Domain {
     pub fn join(&self, name: &str) -> Result<Peer, ShmError> {
         // Errors come back to the caller, which words them.
         set_log_level_from_env_or(LogLevel::Fatal);
-        let refused = |reason: String| ShmError::Node { reason };
-        let name = NodeName::new(name).map_err(|error| refused(error.to_string()))?;
+        let refused = |reason: &dyn Display| {
+            ShmError::Refused(format!(
+                "no place in shared memory: {reason}\n  help: is the folder of iceoryx2 (its root path, and /dev/shm) \
+                 writable?"
+            ))
+        };
+        let name = NodeName::new(name).map_err(|error| refused(&error))?;
         let folders = Folders::of(&self.config);
         folders.open();
         folders.clear_remains(|| has_peers(&self.config), || clean_up(&self.config, &folders));
@@ -73,7 +85,7 @@ impl Domain {
             .config(&self.config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
-            .map_err(|error| refused(error.to_string()))?;
+            .map_err(|error| refused(&error))?;
         // The last of other peers may have removed them meanwhile, and iceoryx2 have made them this user's alone.
         folders.open();
         Ok(Peer { node, config: self.config.clone(), folders })

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use iceoryx2::prelude::Config;
 
 use super::ShmError;
+use super::domain::VARIABLE;
 
 /// Removes them when it is dropped, which must be after all that has files in them.
 #[derive(Debug)]
@@ -69,7 +70,16 @@ impl Folders {
         files.retain(|file| is_left(file) && is_unfinished(file, &self.service));
         files.retain(|file| is_open(file) || fs::remove_file(file).is_err());
         files.retain(|file| file.exists());
-        if files.is_empty() { Ok(()) } else { Err(ShmError::Unfinished { files }) }
+        if files.is_empty() {
+            return Ok(());
+        }
+        let listed: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+        let it = if files.len() == 1 { "it" } else { "them" };
+        Err(ShmError::Refused(format!(
+            "a process does not finish {}, for which iceoryx2 waits without end\n  help: end all programs of this domain and \
+             start again, which removes {it}, remove {it} yourself, or take another {VARIABLE}",
+            listed.join(", ")
+        )))
     }
 
     /// Removes the files of a domain in which no process lives, after `clean_up` has removed what iceoryx2 can: what a dead
@@ -121,6 +131,13 @@ impl Folders {
     fn unfinished(&self) -> Vec<PathBuf> {
         self.files().into_iter().filter(|file| is_unfinished(file, &self.service)).collect()
     }
+
+    /// Whether a file of shared memory counts the nodes of this domain: `PREFIX`, a checksum, a name.
+    fn is_counter(&self, name: &str) -> bool {
+        let middle = name.strip_prefix(&self.prefix).and_then(|name| name.strip_suffix(&self.counter));
+        let checksum = middle.and_then(|middle| middle.split_once('_'));
+        checksum.is_some_and(|(sum, _)| !sum.is_empty() && sum.bytes().all(|byte| byte.is_ascii_hexdigit()))
+    }
 }
 
 /// Whether a process has a file open, or may: its maker has until it is finished.
@@ -144,7 +161,12 @@ fn has_ending(file: &Path, ending: &str) -> bool {
 /// Says how much there is.
 pub(super) fn require_room(bytes: u64) -> Result<(), ShmError> {
     match room() {
-        Some(free) if free < bytes => Err(ShmError::Room { folder: SHARED_MEMORY, needed: bytes, free }),
+        Some(free) if free < bytes => Err(ShmError::Refused(format!(
+            "{SHARED_MEMORY} has {} kB free, and this takes about {} kB\n  help: remove what is not needed there, or make it \
+             larger: `mount -o remount,size=64m {SHARED_MEMORY}`, of a container its `--shm-size`",
+            free / 1000,
+            bytes / 1000
+        ))),
         _ => Ok(()),
     }
 }
@@ -194,15 +216,6 @@ impl Drop for Folders {
         }
         // One with files in it is in use. Of a peer that has joined there is a node before there is a service.
         let _ = self.folders.iter().rev().try_for_each(fs::remove_dir);
-    }
-}
-
-impl Folders {
-    /// Whether a file of shared memory counts the nodes of this domain: `PREFIX`, a checksum, a name.
-    fn is_counter(&self, name: &str) -> bool {
-        let middle = name.strip_prefix(&self.prefix).and_then(|name| name.strip_suffix(&self.counter));
-        let checksum = middle.and_then(|middle| middle.split_once('_'));
-        checksum.is_some_and(|(sum, _)| !sum.is_empty() && sum.bytes().all(|byte| byte.is_ascii_hexdigit()))
     }
 }
 

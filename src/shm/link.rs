@@ -1,6 +1,5 @@
 //! The ends of a [`transport`](crate::swarm::transport) over shared memory.
 
-use super::channel::MOST_AT_ONCE;
 use super::payload::{Leader, Pose as Wire, Range as WireRange, Target as WireTarget};
 use super::wait::Bell;
 use super::{Capacity, Peer, Reader, ShmError, Writer};
@@ -84,8 +83,6 @@ impl ControllerEnd for Controller {
 
     fn receive(&mut self, now: f64, take: &mut dyn FnMut(Received)) {
         let Self { poses, ranges, leaders, hears, serves, refused, complaints, .. } = self;
-        poses.still();
-        leaders.still();
         let count = hears.len();
         let mut refuse = |service: &str, what: &str, member: usize| {
             *refused += 1;
@@ -96,8 +93,7 @@ impl ControllerEnd for Controller {
             complaints.warn("no such robot", count, system_time(), &text);
         };
         if let Some(ranges) = ranges {
-            ranges.still();
-            for slice in std::iter::from_fn(|| ranges.take()).take(MOST_AT_ONCE) {
+            for slice in ranges.arrived() {
                 for wire in slice.iter() {
                     let [observer, of] = [wire.observer, wire.of].map(|member| member as usize);
                     if observer.max(of) >= count {
@@ -109,7 +105,7 @@ impl ControllerEnd for Controller {
                 }
             }
         }
-        for slice in std::iter::from_fn(|| poses.take()).take(MOST_AT_ONCE) {
+        for slice in poses.arrived() {
             for wire in slice.iter() {
                 let member = wire.member as usize;
                 if member >= count {
@@ -119,7 +115,7 @@ impl ControllerEnd for Controller {
                 }
             }
         }
-        for slice in std::iter::from_fn(|| leaders.take()).take(MOST_AT_ONCE) {
+        for slice in leaders.arrived() {
             for leader in slice.iter() {
                 let member = leader.member as usize;
                 if member >= count {
@@ -223,8 +219,7 @@ impl RobotsEnd for Robots {
     }
 
     fn targets(&mut self, go: &mut dyn FnMut(usize, [f64; 2])) {
-        self.targets.still();
-        for slice in std::iter::from_fn(|| self.targets.take()).take(MOST_AT_ONCE) {
+        for slice in self.targets.arrived() {
             slice.iter().for_each(|target| go(target.member as usize, target.position));
         }
     }

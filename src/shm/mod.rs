@@ -37,8 +37,6 @@ pub use domain::{Domain, Peer};
 pub use node::FormationNode;
 pub use robots::SimulatedRobots;
 
-use std::path::PathBuf;
-
 use crate::scene::SceneError;
 use crate::swarm::control::scope::NodeScopeError;
 
@@ -51,59 +49,9 @@ pub enum ShmError {
     /// A robot cannot be served alone.
     #[error("{0}")]
     NodeScope(#[from] NodeScopeError),
-    /// A domain is set to a name that is none.
-    #[error(
-        "{variable}={name:?} is no domain\n  help: give 1 to 32 letters, digits, `-` and `_`, or unset it for iceoryx2's own"
-    )]
-    Domain {
-        /// The environment variable that sets it.
-        variable: &'static str,
-        /// Its present value.
-        name: String,
-    },
-    /// A swarm or body has a name that no service may bear.
-    #[error(
-        "{name:?} is no name of a service: {reason}\n  help: give 1 to 64 letters, digits, `-`, `_` and `.`"
-    )]
-    Name {
-        /// The name.
-        name: String,
-        /// The fault in it.
-        reason: &'static str,
-    },
-    /// The process cannot take part in shared memory at all.
-    #[error(
-        "no place in shared memory: {reason}\n  help: is the folder of iceoryx2 (its root path, and /dev/shm) writable?"
-    )]
-    Node {
-        /// The error of iceoryx2.
-        reason: String,
-    },
-    /// A process has not finished files that it makes, and has them open.
-    #[error(
-        "a process does not finish {}, for which iceoryx2 waits without end\n  help: end all programs of this domain and start again, which removes {it}, remove {it} yourself, or take another {variable}",
-        listed(files),
-        it = if files.len() == 1 { "it" } else { "them" },
-        variable = domain::VARIABLE
-    )]
-    Unfinished {
-        /// The files.
-        files: Vec<PathBuf>,
-    },
-    /// Shared memory is full.
-    #[error(
-        "{folder} has {} kB free, and this takes about {} kB\n  help: remove what is not needed there, or make it larger: `mount -o remount,size=64m {folder}`, of a container its `--shm-size`",
-        free / 1000,
-        needed / 1000
-    )]
-    Room {
-        /// Folder of shared memory.
-        folder: &'static str,
-        /// \[bytes\]
-        needed: u64,
-        /// \[bytes\]
-        free: u64,
-    },
+    /// A name that is none, or a computer that does not give what is needed, with the remedy.
+    #[error("{0}")]
+    Refused(String),
     /// A service carries another type, or another version of it.
     #[error(
         "{service} carries `{found}`, and this program speaks `{expected}`\n  help: use programs of one version, or keep them apart by {variable}",
@@ -135,16 +83,6 @@ pub enum ShmError {
         /// The error of iceoryx2.
         reason: String,
     },
-    /// The process cannot sleep until something arrives.
-    #[error("cannot wait for what arrives: {reason}")]
-    Wait {
-        /// The error of iceoryx2.
-        reason: String,
-    },
-}
-
-fn listed(files: &[PathBuf]) -> String {
-    files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>().join(", ")
 }
 
 /// Shared memory of one process of a swarm of so many robots \[bytes\]: of what its services and slices may grow to the part

@@ -6,7 +6,6 @@
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-use super::channel::MOST_AT_ONCE;
 use super::link::Controller;
 use super::payload::{Command, Formation, Member};
 use super::{Capacity, Domain, Peer, Reader, ShmError, Writer, folders, room_for_swarm, wait};
@@ -134,8 +133,7 @@ impl FormationNode {
     }
 
     fn obey(&mut self) {
-        self.commands.still();
-        for slice in std::iter::from_fn(|| self.commands.take()).take(MOST_AT_ONCE) {
+        for slice in self.commands.arrived() {
             for command in slice.iter() {
                 match command.kind {
                     Command::EMERGENCY_STOP if self.orders.may_stop() => self.control.emergency_stop(),

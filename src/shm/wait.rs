@@ -1,5 +1,6 @@
 //! Sleeping until something arrives or is due.
 
+use std::fmt::Display;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -25,12 +26,12 @@ pub fn keep(
     stop: &AtomicBool,
     next: &mut dyn FnMut(bool) -> Duration,
 ) -> Result<(), ShmError> {
-    let refused = |reason: String| ShmError::Wait { reason };
+    let refused = |error: &dyn Display| ShmError::Refused(format!("cannot wait for what arrives: {error}"));
     let builder = WaitSetBuilder::new().signal_handling_mode(SignalHandlingMode::Disabled);
-    let set = builder.create::<ipc::Service>().map_err(|error| refused(error.to_string()))?;
+    let set = builder.create::<ipc::Service>().map_err(|error| refused(&error))?;
     let mut guards = Vec::with_capacity(bells.len());
     for bell in bells {
-        guards.push(set.attach_notification(&**bell).map_err(|error| refused(error.to_string()))?);
+        guards.push(set.attach_notification(&**bell).map_err(|error| refused(&error))?);
     }
     let mut arrived = false;
     while !stop.load(Ordering::Relaxed) {
@@ -39,8 +40,7 @@ pub fn keep(
             arrived = true;
             CallbackProgression::Continue
         };
-        set.wait_and_process_once_with_timeout(&mut ring, rest)
-            .map_err(|error| refused(error.to_string()))?;
+        set.wait_and_process_once_with_timeout(&mut ring, rest).map_err(|error| refused(&error))?;
     }
     Ok(())
 }

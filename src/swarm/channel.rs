@@ -8,6 +8,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::watch::Pose;
 use crate::flock::splitmix;
+use crate::scene::swarm::raw::RawFlight;
 
 /// Parameters of a channel. The default one delivers every pose at once and unchanged.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -23,6 +24,14 @@ pub struct ChannelParams {
     pub loss: f64,
     /// Probability that it comes once more, a period later \[1\], default 0.
     pub duplication: f64,
+}
+
+impl ChannelParams {
+    /// Those with which a simulated flight begins.
+    pub(super) fn of(flight: &RawFlight) -> Self {
+        let RawFlight { noise, delay, jitter, loss, duplicates: duplication, .. } = *flight;
+        Self { noise, delay, jitter, loss, duplication }
+    }
 }
 
 /// The pose that a faulty robot sends in place of the true one; stamps stay true.
@@ -292,7 +301,6 @@ mod tests {
         let sent = |lie| {
             let mut channel = Channel::new(ChannelParams::default(), 1, 0);
             channel.send(0, pose(0));
-            channel.set_sender(Sender::Lying(lie));
             (1..9).for_each(|period| {
                 channel.set_sender(Sender::Lying(lie));
                 channel.send(period, pose(period));

@@ -59,6 +59,7 @@ fn topics_and_services_are_expanded_and_remapped_by_the_first_rule_that_matches(
         ("-r a:=b -r b:=c", "/", "a", "/b", "/b"),
         ("-r other:a:=b -r a:=c", "/", "a", "/c", "/c"),
         ("-r rostopic:a:=b", "/", "a", "/a", "/a"),
+        ("", "/", "A/b2/c_d", "/A/b2/c_d", "/A/b2/c_d"),
         ("-r __ns:=/foo", "/ns", "bar", "/foo/bar", "/foo/bar"),
         ("-r __ns:=/foo -r bar:=baz", "/ns", "bar", "/foo/baz", "/foo/baz"),
         ("-r __ns:=/foo", "/ns", "/ns/bar", "/ns/bar", "/ns/bar"),

@@ -6,7 +6,7 @@ mod random_flights;
 
 use flockform::flock::vectors::{Vectors, distance};
 use flockform::swarm::robots::{DoubleIntegrator, Model, Robot};
-use flockform::swarm::safety::{Filter, Flags, Limits, Obstacle, Obstacles, Patience, Seen};
+use flockform::swarm::safety::{Filter, Flags, Limits, Obstacle, Obstacles, Seen};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -483,13 +483,7 @@ fn velocity_changes_no_faster_than_allowed_and_a_robot_stops_at_its_goal() {
     let limits = Limits { acceleration: 0.5, ..limits(1.0, 0.1) };
     let mut world =
         World::new(limits, 0.2, &[rectangle([6.0, -1.0], [7.0, 30.0])], &[[[0.0, 0.0], [0.0, 20.0]]]);
-    world
-        .filter
-        .set_limits(Limits {
-            patience: Patience { ticks: 0, ..Patience::default() },
-            ..world.filter.limits().clone()
-        })
-        .expect("limits");
+    world.filter.set_limits(Limits { patience: 0, ..world.filter.limits().clone() }).expect("limits");
     let mut velocity = Vectors::zeros(1);
     let mut fastest = 0.0_f64;
     for tick in 0..300 {

@@ -14,9 +14,12 @@ pub fn as_event(request: &SetFormationRequest) -> (u8, String, Vec<f64>) {
     if !request.name.is_empty() {
         return (LoopEvent::MANOEUVRE, request.name.clone(), Vec::new());
     }
-    let SetFormationRequest { translate, rotate, stretch, shear, duration, .. } = *request;
-    let values = [translate[0], translate[1], rotate, stretch[0], stretch[1], shear[0], shear[1], duration];
-    (LoopEvent::POSTURE, String::new(), values.to_vec())
+    (LoopEvent::POSTURE, String::new(), numbers(request).to_vec())
+}
+
+fn numbers(request: &SetFormationRequest) -> [f64; 8] {
+    let SetFormationRequest { translate: [tx, ty], rotate, stretch, shear, duration, .. } = *request;
+    [tx, ty, rotate, stretch[0], stretch[1], shear[0], shear[1], duration]
 }
 
 /// Moves the leaders, as the service asks for it.
@@ -54,8 +57,7 @@ pub(crate) fn requested(control: &Control, request: &SetFormationRequest) -> Res
         });
     }
     let SetFormationRequest { translate, rotate, stretch, shear, duration, .. } = *request;
-    let numbers = [translate[0], translate[1], rotate, stretch[0], stretch[1], shear[0], shear[1], duration];
-    if !numbers.iter().all(|number| number.is_finite()) {
+    if !numbers(request).iter().all(|number| number.is_finite()) {
         return Err("a number is not finite".into());
     }
     if duration <= 0.0 {

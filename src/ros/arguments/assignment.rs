@@ -104,8 +104,7 @@ const SHAPE: &str = "write [NODE:]NAME:=VALUE, the value in YAML: rate:=50.0, na
 /// Reads the rule after `-p`. A node prefix means the node of that name in any namespace, as it does
 /// for remap rules.
 pub(super) fn parse(flag: &str, rule: &str) -> Result<Assignment, RosArgumentError> {
-    let refuse =
-        |reason: String, help| RosArgumentError::Rule { flag: flag.into(), rule: rule.into(), reason, help };
+    let refuse = |reason: String, help| RosArgumentError::rule(flag, rule, (reason, help));
     // Values may have colons, so the node is looked for on the left of `:=` alone.
     let (left, value) = rule.split_once(":=").ok_or_else(|| refuse("has no `:=`".into(), SHAPE))?;
     let (node, name) = split_node(left);

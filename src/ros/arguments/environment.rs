@@ -85,37 +85,38 @@ impl Environment {
 /// Peers that are found in ways that this node does not have.
 fn unreachable_peers(variable: &dyn Fn(&str) -> Option<String>) -> Option<RosArgumentError> {
     let names_any = |peers: &String| peers.split(';').any(|peer| !peer.is_empty());
-    let refusal =
-        |variable, value, reason, help| RosArgumentError::Environment { variable, value, reason, help };
-    let peers = variable("ROS_STATIC_PEERS").filter(names_any).map(|value| {
-        refusal(
+    let ways = [
+        (
             "ROS_STATIC_PEERS",
-            value,
             "this node finds peers by multicast and on this computer, not by address",
             "unset it for this process and let multicast reach the peers, or run it beside them",
-        )
-    });
-    peers.or_else(|| {
-        let value = variable("ROS_DISCOVERY_SERVER").filter(names_any)?;
-        Some(refusal(
+        ),
+        (
             "ROS_DISCOVERY_SERVER",
-            value,
             "this node finds peers by multicast, not from a server of Fast DDS, and peers that ask one do not find it",
             "unset it for this process and for its peers",
-        ))
-    })
+        ),
+    ];
+    ways.into_iter()
+        .find_map(|(name, reason, help)| Some(refused(name, variable(name).filter(names_any)?, reason, help)))
+}
+
+fn refused(
+    variable: &'static str,
+    value: String,
+    reason: &'static str,
+    help: &'static str,
+) -> RosArgumentError {
+    RosArgumentError::Environment { variable, value, reason, help }
 }
 
 fn read_middleware(value: String) -> Result<String, RosArgumentError> {
     if ON_DDS.contains(&value.as_str()) {
         return Ok(value);
     }
-    Err(RosArgumentError::Environment {
-        variable: "RMW_IMPLEMENTATION",
-        value,
-        reason: "this node speaks DDS, and nodes on a middleware that is not known to do so do not hear it",
-        help: "run its peers on rmw_fastrtps_cpp or rmw_cyclonedds_cpp; if they are on DDS, unset it for this process",
-    })
+    let reason = "this node speaks DDS, and nodes on a middleware that is not known to do so do not hear it";
+    let help = "run its peers on rmw_fastrtps_cpp or rmw_cyclonedds_cpp; if they are on DDS, unset it for this process";
+    Err(refused("RMW_IMPLEMENTATION", value, reason, help))
 }
 
 fn of_others((name, middleware): &(&str, &str)) -> String {
@@ -124,34 +125,21 @@ fn of_others((name, middleware): &(&str, &str)) -> String {
 
 fn read_domain(value: String) -> Result<u16, RosArgumentError> {
     let domain = integer(&value).and_then(|number| u16::try_from(number).ok());
-    domain.filter(|domain| *domain <= LARGEST_DOMAIN).ok_or(RosArgumentError::Environment {
-        variable: "ROS_DOMAIN_ID",
-        value,
-        reason: "is no whole number from 0 to 232",
-        help: "set a domain from 0 to 232 (0 to 101 is safe on every system), or unset it for 0",
-    })
+    let help = "set a domain from 0 to 232 (0 to 101 is safe on every system), or unset it for 0";
+    let refused = refused("ROS_DOMAIN_ID", value, "is no whole number from 0 to 232", help);
+    domain.filter(|domain| *domain <= LARGEST_DOMAIN).ok_or(refused)
 }
 
 fn read_range(value: String) -> Result<DiscoveryRange, RosArgumentError> {
-    Ok(match value.as_str() {
-        "OFF" => {
-            return Err(RosArgumentError::Environment {
-                variable: "ROS_AUTOMATIC_DISCOVERY_RANGE",
-                value,
-                reason: "the node would discover no robot, not even on this computer",
-                help: "set LOCALHOST for this computer alone, or use --transport shm, which opens no socket",
-            });
-        }
-        "LOCALHOST" => DiscoveryRange::Localhost,
-        "SUBNET" => DiscoveryRange::Subnet,
-        "SYSTEM_DEFAULT" => DiscoveryRange::SystemDefault,
-        _ => {
-            return Err(RosArgumentError::Environment {
-                variable: "ROS_AUTOMATIC_DISCOVERY_RANGE",
-                value,
-                reason: "is no discovery range",
-                help: "set LOCALHOST, SUBNET or SYSTEM_DEFAULT, or unset it for SUBNET",
-            });
-        }
-    })
+    let (reason, help) = match value.as_str() {
+        "LOCALHOST" => return Ok(DiscoveryRange::Localhost),
+        "SUBNET" => return Ok(DiscoveryRange::Subnet),
+        "SYSTEM_DEFAULT" => return Ok(DiscoveryRange::SystemDefault),
+        "OFF" => (
+            "the node would discover no robot, not even on this computer",
+            "set LOCALHOST for this computer alone, or use --transport shm, which opens no socket",
+        ),
+        _ => ("is no discovery range", "set LOCALHOST, SUBNET or SYSTEM_DEFAULT, or unset it for SUBNET"),
+    };
+    Err(refused("ROS_AUTOMATIC_DISCOVERY_RANGE", value, reason, help))
 }

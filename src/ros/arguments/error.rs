@@ -28,6 +28,12 @@ pub enum RosArgumentError {
     Security { place: String, reason: String, help: &'static str },
 }
 
+impl RosArgumentError {
+    pub(super) fn rule(flag: &str, rule: &str, (reason, help): Reason) -> Self {
+        Self::Rule { flag: flag.into(), rule: rule.into(), reason, help }
+    }
+}
+
 fn nearest_flag(nearest: &Option<&'static str>) -> String {
     let end = "arguments of the program itself go before `--ros-args` or after `--`";
     match nearest {

@@ -3,7 +3,6 @@
 use std::ffi::OsStr;
 use std::path::PathBuf;
 
-use super::assignment::{Assignment, Origin};
 use super::logging::Logging;
 use super::security::fault_of_name;
 use super::{RosArgumentError, RosArguments, assignment, parameter_file};
@@ -58,12 +57,12 @@ impl RosArguments {
                 self.logging.take_level(&rule)?;
             }
             "--log-config-file" => {
-                return Err(no_log_library(flag, text("the path of a configuration file")?));
+                return Err(no_log_library(flag, &text("the path of a configuration file")?));
             }
-            "--log-file-name" => return Err(no_log_library(flag, text("a file name prefix")?)),
+            "--log-file-name" => return Err(no_log_library(flag, &text("a file name prefix")?)),
             "-e" | "--enclave" => self.enclave = Some(enclave(flag, text("a security enclave /PATH")?)?),
             switch if switch_of(&mut self.logging, switch) => {}
-            "--enable-external-lib-logs" => return Err(no_log_library(flag, String::new())),
+            "--enable-external-lib-logs" => return Err(no_log_library(flag, "")),
             _ => return Err(unknown(flag.into())),
         }
         Ok(())
@@ -72,11 +71,7 @@ impl RosArguments {
     fn read_parameters(&mut self, path: PathBuf) -> Result<(), RosArgumentError> {
         let text =
             text::read(&path).map_err(|error| RosArgumentError::ReadFile { path: path.clone(), error })?;
-        let read = parameter_file::parse(&text).map_err(|error| error.in_file(&path))?;
-        self.assignments.extend(read.into_iter().map(|entry| {
-            let origin = Origin::File { path: path.clone(), line: entry.line };
-            Assignment::new(entry.node, entry.name, entry.value, origin)
-        }));
+        self.assignments.extend(parameter_file::parse(&path, &text)?);
         self.parameter_files.push(path);
         Ok(())
     }
@@ -84,19 +79,15 @@ impl RosArguments {
 
 /// A rule, which is text; a path alone may be any bytes.
 fn read_text(flag: &str, value: &OsStr) -> Result<String, RosArgumentError> {
-    let refuse = || RosArgumentError::Rule {
-        flag: flag.into(),
-        rule: value.to_string_lossy().into_owned(),
-        reason: "it is not UTF-8".into(),
-        help: "write it in UTF-8",
-    };
+    let why = || ("it is not UTF-8".into(), "write it in UTF-8");
+    let refuse = || RosArgumentError::rule(flag, &value.to_string_lossy(), why());
     value.to_str().map(str::to_owned).ok_or_else(refuse)
 }
 
 fn enclave(flag: &str, name: String) -> Result<String, RosArgumentError> {
     let Some(reason) = fault_of_name(&name) else { return Ok(name) };
     let help = "name it as in `ros2 security create_enclave`: /fleet/robot_7";
-    Err(RosArgumentError::Rule { flag: flag.into(), rule: name, reason: reason.into(), help })
+    Err(RosArgumentError::rule(flag, &name, (reason.into(), help)))
 }
 
 /// Sets the switch that `flag` names; false where it names none.
@@ -116,14 +107,9 @@ fn switch_of(logging: &mut Logging, flag: &str) -> bool {
     true
 }
 
-fn no_log_library(flag: &str, rule: String) -> RosArgumentError {
+fn no_log_library(flag: &str, rule: &str) -> RosArgumentError {
     let reason = "this node logs to the console and to /rosout alone".into();
-    RosArgumentError::Rule {
-        flag: flag.into(),
-        rule,
-        reason,
-        help: "leave it out, and keep the console's output",
-    }
+    RosArgumentError::rule(flag, rule, (reason, "leave it out, and keep the console's output"))
 }
 
 fn unknown(flag: String) -> RosArgumentError {

@@ -42,12 +42,8 @@ impl Logging {
 
     /// Reads the value of `--log-level`: `LEVEL` or `LOGGER:=LEVEL`.
     pub(super) fn take_level(&mut self, rule: &str) -> Result<(), RosArgumentError> {
-        let refuse = |reason: String| RosArgumentError::Rule {
-            flag: "--log-level".into(),
-            rule: rule.into(),
-            reason,
-            help: "write DEBUG, INFO, WARN, ERROR, FATAL or UNSET, or LOGGER:=LEVEL for one logger",
-        };
+        let help = "write DEBUG, INFO, WARN, ERROR, FATAL or UNSET, or LOGGER:=LEVEL for one logger";
+        let refuse = |reason| RosArgumentError::rule("--log-level", rule, (reason, help));
         let severity =
             |word: &str| Severity::parse(word).ok_or_else(|| refuse(format!("`{word}` is no log level")));
         match rule.split_once(":=") {

@@ -14,33 +14,35 @@
 use std::path::Path;
 
 use super::yaml::{self, Entry, Node, YamlError};
-use super::{NodePattern, RosArgumentError, Value, value};
+use super::{Assignment, NodePattern, Origin, RosArgumentError, Value, value};
 
 const PARAMETERS: &str = "ros__parameters";
 const SHAPE: &str = "write NODE, then ros__parameters below it, then NAME: VALUE lines";
 
-/// One parameter of a file.
-#[derive(Debug)]
-pub struct FileEntry {
-    pub node: NodePattern,
-    pub name: String,
-    pub value: Value,
-    /// Line of the parameter's name, from 1.
-    pub line: usize,
-}
+/// Takes a parameter of a node: its name, its value and the line of its name, from 1.
+type Take<'a> = &'a mut dyn FnMut(&NodePattern, String, Value, usize);
 
 /// The parameters of the file that holds `text`, in its order.
-pub fn parse(text: &str) -> Result<Vec<FileEntry>, YamlError> {
+pub fn parse(path: &Path, text: &str) -> Result<Vec<Assignment>, RosArgumentError> {
     let mut parameters = Vec::new();
-    match yaml::parse(text)? {
-        None => {}
-        Some(Node::Mapping(entries)) => read_nodes("", &entries, &mut parameters)?,
-        Some(_) => return Err(error(1, "is no mapping of node names".into(), SHAPE)),
-    }
-    Ok(parameters)
+    let mut take = |node: &NodePattern, name: String, value: Value, line: usize| {
+        let origin = Origin::File { path: path.into(), line };
+        parameters.push(Assignment::new(node.clone(), name, value, origin));
+    };
+    let read = yaml::parse(text).and_then(|document| match document {
+        None => Ok(()),
+        Some(Node::Mapping(entries)) => read_nodes("", &entries, &mut take),
+        Some(_) => Err(error(1, "is no mapping of node names".into(), SHAPE)),
+    });
+    read.map(|()| parameters).map_err(|YamlError { line, reason, help }| RosArgumentError::ParameterFile {
+        path: path.into(),
+        line,
+        reason,
+        help,
+    })
 }
 
-fn read_nodes(above: &str, entries: &[Entry], parameters: &mut Vec<FileEntry>) -> Result<(), YamlError> {
+fn read_nodes(above: &str, entries: &[Entry], take: Take<'_>) -> Result<(), YamlError> {
     for Entry { key, line, node } in entries {
         let children = match node {
             Node::Mapping(children) => children,
@@ -56,13 +58,13 @@ fn read_nodes(above: &str, entries: &[Entry], parameters: &mut Vec<FileEntry>) -
             let pattern = NodePattern::parse(above).map_err(|reason| {
                 error(*line, format!("node `{above}`: {reason}"), "write /team/flockform, /team/* or /**")
             })?;
-            read_parameters(&pattern, "", children, parameters)?;
+            read_parameters(&pattern, "", children, take)?;
         } else {
             let below = match above {
                 "" => key.clone(),
                 _ => format!("{}/{}", above.trim_end_matches('/'), key.trim_start_matches('/')),
             };
-            read_nodes(&below, children, parameters)?;
+            read_nodes(&below, children, take)?;
         }
     }
     Ok(())
@@ -72,28 +74,21 @@ fn read_parameters(
     pattern: &NodePattern,
     above: &str,
     entries: &[Entry],
-    parameters: &mut Vec<FileEntry>,
+    take: Take<'_>,
 ) -> Result<(), YamlError> {
     for Entry { key, line, node } in entries {
         let name = if above.is_empty() { key.clone() } else { format!("{above}.{key}") };
         if let Node::Mapping(children) = node {
-            read_parameters(pattern, &name, children, parameters)?;
+            read_parameters(pattern, &name, children, take)?;
             continue;
         }
         let value = value::from_node(node)
             .map_err(|(reason, help)| error(*line, format!("parameter `{name}` {reason}"), help))?;
-        parameters.push(FileEntry { node: pattern.clone(), name, value, line: *line });
+        take(pattern, name, value, *line);
     }
     Ok(())
 }
 
 fn error(line: usize, reason: String, help: &'static str) -> YamlError {
     YamlError { line, reason, help }
-}
-
-impl YamlError {
-    pub(super) fn in_file(self, path: &Path) -> RosArgumentError {
-        let Self { line, reason, help } = self;
-        RosArgumentError::ParameterFile { path: path.into(), line, reason, help }
-    }
 }

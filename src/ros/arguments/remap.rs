@@ -12,12 +12,7 @@ impl RemapRule {
     /// # Errors
     /// A rule that `rcl` does not understand or implement; the message says which part.
     pub fn parse(flag: &str, rule: &str) -> Result<Self, RosArgumentError> {
-        let refuse = |(reason, help): Reason| RosArgumentError::Rule {
-            flag: flag.into(),
-            rule: rule.into(),
-            reason,
-            help,
-        };
+        let refuse = |why: Reason| RosArgumentError::rule(flag, rule, why);
         let (node, body) = split_node(rule);
         if let Some(node) = node {
             check_token(node).map_err(|reason| refuse((format!("the node prefix {reason}"), SHAPE)))?;
@@ -61,10 +56,8 @@ fn parse_name(from: &str, to: &str) -> Result<Remap, Reason> {
         _ => (Scope::Both, from),
     };
     if to.starts_with("rostopic://") || to.starts_with("rosservice://") {
-        return Err((
-            "the right side has a scheme".into(),
-            "write rostopic:// or rosservice:// on the left only",
-        ));
+        let help = "write rostopic:// or rosservice:// on the left only";
+        return Err(("the right side has a scheme".into(), help));
     }
     if scope != Scope::Both && ["__ns", "__node", "__name"].contains(&from) {
         return Err((format!("`{from}` has a scheme before it"), SHAPE));
@@ -76,13 +69,12 @@ fn parse_name(from: &str, to: &str) -> Result<Remap, Reason> {
 
 /// One side of a rule: tokens with `/` between them, absolute, private (`~/`) or relative.
 fn check_side(side: &str, name: &str) -> Result<(), Reason> {
-    if name.contains('*') {
-        let reason = format!("the {side} side has a wildcard, which ROS 2 does not implement for names");
-        return Err((reason, "write one rule for each name"));
-    }
-    if name.contains('\\') {
-        let reason = format!("the {side} side refers to a wildcard, which ROS 2 does not implement");
-        return Err((reason, "write one rule for each name"));
+    let signs = [
+        ('*', "has a wildcard, which ROS 2 does not implement for names"),
+        ('\\', "refers to a wildcard, which ROS 2 does not implement"),
+    ];
+    if let Some((_, fault)) = signs.into_iter().find(|(sign, _)| name.contains(*sign)) {
+        return Err((format!("the {side} side {fault}"), "write one rule for each name"));
     }
     let tokens = name.strip_prefix("~/").or_else(|| name.strip_prefix('/')).unwrap_or(name);
     for token in tokens.split('/') {

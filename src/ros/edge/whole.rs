@@ -36,7 +36,6 @@ pub(super) struct WholeReplies {
     again: Mutex<VecDeque<Sent>>,
 }
 
-/// A sample that was sent.
 struct Sent {
     first: Instant,
     times: usize,

@@ -32,7 +32,7 @@ impl Endpoints {
     pub fn open(origin: &Origin, control: &Control) -> Result<Self, NodeError> {
         let Origin { node, names, part, swarm, .. } = origin;
         let raw = &swarm.raw.node;
-        let topic = |pattern: &str, m: usize| origin.topic_of(pattern, &control.formation().names[m]);
+        let topic = |pattern: &str, m: usize| Ok(names.robot_topic(pattern, &control.formation().names[m])?);
         let link = Link::open(node, raw, control, part, origin.simulated_time, &topic)?;
         let mut drives = Vec::new();
         for (m, kind) in part.mine.iter().flat_map(|&m| Some((m, raw.velocity?))) {

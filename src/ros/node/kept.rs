@@ -76,7 +76,6 @@ impl FormationNode {
     }
 
     fn go_to(&mut self, state: State, now: f64) {
-        let (lifecycle, mut transitions) = self.transitions(now);
-        lifecycle.go_to(state, now, &mut |goal| transitions.act(goal));
+        self.follow(now, |lifecycle, act| lifecycle.go_to(state, now, act));
     }
 }

@@ -67,6 +67,8 @@ pub struct FormationNode {
     settings: Settings,
     parameters: Parameters,
     lifecycle: Lifecycle,
+    /// Why the last `configure` failed.
+    failure: Option<NodeError>,
     stop: Service<std_srvs::Trigger>,
     /// The same by topic; none where nothing may stop the node.
     stop_requests: Option<Subscription<Empty>>,
@@ -136,6 +138,7 @@ impl FormationNode {
                 &node,
                 [RawService::Lifecycle, RawService::TransitionEvents].map(|kind| raw.serves(kind)),
             )?,
+            failure: None,
             stop: node.service(&service("emergency_stop")?)?,
             stop_requests: stop_topic
                 .map(|topic| node.subscription(&topic, Quality::reliable(1)))
@@ -183,12 +186,10 @@ impl FormationNode {
         Ok(this)
     }
 
-    /// Takes the node to active.
     fn start(&mut self) -> Result<(), NodeError> {
         let now = self.time();
-        let (lifecycle, mut transitions) = self.transitions(now);
-        lifecycle.autostart(now, &mut |goal| transitions.act(goal));
-        transitions.failure.map_or(Ok(()), Err)
+        self.follow(now, |lifecycle, act| lifecycle.autostart(now, act));
+        self.failure.take().map_or(Ok(()), Err)
     }
 
     /// By its clock, or by the computer's where it has none yet \[s\].
@@ -277,8 +278,7 @@ impl FormationNode {
         }
         self.pulse.iter().for_each(|pulse| pulse.leave());
         let now = self.time();
-        let (lifecycle, mut transitions) = self.transitions(now);
-        lifecycle.shut_down(now, &mut |goal| transitions.act(goal));
+        self.follow(now, |lifecycle, act| lifecycle.shut_down(now, act));
         // Robots that are driven by velocities would go on for ever.
         self.publish(now, self.lifecycle.is_active());
         self.rosout.iter().for_each(Rosout::publish);
@@ -412,15 +412,15 @@ impl FormationNode {
             _ => None,
         });
         let pulse = self.pulse.clone();
-        let (lifecycle, mut transitions) = self.transitions(now);
-        let mut act = |goal| match &pulse {
-            Some(pulse) => pulse.untimed(|| transitions.act(goal)),
-            None => transitions.act(goal),
-        };
-        lifecycle.poll(now, &may_switch, &mut act);
-        // After those of peers, which it cannot keep out.
-        let changed =
-            own_transition.is_some_and(|label| lifecycle.change(0, label, now, &may_switch, &mut act));
+        let changed = self.follow(now, |lifecycle, act| {
+            let mut act = |goal| match &pulse {
+                Some(pulse) => pulse.untimed(|| act(goal)),
+                None => act(goal),
+            };
+            lifecycle.poll(now, &may_switch, &mut act);
+            // After those of peers, which it cannot keep out.
+            own_transition.is_some_and(|label| lifecycle.change(0, label, now, &may_switch, &mut act))
+        });
         self.record_beginning(now);
         if self.lifecycle.is_active() != self.was_active {
             self.was_active = self.lifecycle.is_active();

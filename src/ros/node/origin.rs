@@ -29,14 +29,6 @@ pub(super) struct Origin {
 }
 
 impl Origin {
-    /// Fully qualified name of a robot's topic.
-    ///
-    /// # Errors
-    /// A name that ROS 2 does not allow.
-    pub fn topic_of(&self, pattern: &str, robot: &str) -> Result<String, NodeError> {
-        Ok(self.names.fleet_topic(&pattern.replace("{name}", robot))?)
-    }
-
     /// Takes topics and frame from the parameters.
     pub fn take_names(&mut self, parameters: &Parameters) {
         let raw = &mut self.swarm.raw.node;
@@ -86,7 +78,7 @@ impl Origin {
             // Topics below the node are its own alone: other robots' nodes have others.
             let is_private = pattern.starts_with('~');
             for (m, robot) in formation.names.iter().enumerate() {
-                let topic = self.topic_of(pattern, robot)?;
+                let topic = self.names.robot_topic(pattern, robot)?;
                 if is_used(m) && (!is_private || own.contains(&m)) {
                     uses.add(topic, purpose, robot)?;
                 }
@@ -103,8 +95,8 @@ impl Origin {
     /// The topic of a robot's poses.
     pub fn pose_topic(&self, member: usize) -> String {
         // Checked before the topics were opened.
-        self.topic_of(&self.swarm.raw.node.pose_topic, &self.fresh.formation().names[member])
-            .unwrap_or_default()
+        let robot = &self.fresh.formation().names[member];
+        self.names.robot_topic(&self.swarm.raw.node.pose_topic, robot).unwrap_or_default()
     }
 
     /// Where its first robot is reached, in words.
@@ -112,7 +104,7 @@ impl Origin {
         let (raw, robots) = (&self.swarm.raw.node, &self.fresh.formation().names);
         let first = self.part.mine.first().map_or("{name}", |&m| &robots[m]);
         // Checked before the topics were opened.
-        let topic = |pattern: &str| self.topic_of(pattern, first).unwrap_or_default();
+        let topic = |pattern: &str| self.names.robot_topic(pattern, first).unwrap_or_default();
         let (poses, targets) = (topic(&raw.pose_topic), topic(&raw.target_topic));
         format!("{first}: poses from {poses}, targets to {targets}, in the frame `{}`", raw.frame_id)
     }

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::NodeError;
 use crate::messages::names::Names;
+use crate::messages::recorder::set_parameter;
 use crate::ros::arguments::{Parameter, RosArguments};
 use crate::ros::edge::parameters::{Change, Declaration, Store, Value};
 use crate::scene::swarm::Swarm;
@@ -135,8 +136,8 @@ fn topic(declaration: Declaration, names: Names, robot: String) -> Declaration {
     declaration.describe("topic of each robot; {name} stands for the robot's name").checked(
         "a topic's name",
         move |_, value| {
-            let pattern = value.as_str().unwrap_or_default().replace("{name}", &robot);
-            names.fleet_topic(&pattern).map(|_| ()).map_err(|error| error.to_string())
+            let pattern = value.as_str().unwrap_or_default();
+            names.robot_topic(pattern, &robot).map(drop).map_err(|error| error.to_string())
         },
     )
 }
@@ -188,8 +189,6 @@ impl Settings {
     pub fn apply(&mut self, change: &Change, control: &mut Control, pace: &mut Pace) {
         let whole = change.value.as_integer().map(|number| number as f64);
         let Some(number) = change.value.as_double().or(whole) else { return };
-        let limit = if number == NONE { f64::INFINITY } else { number };
-        let mut limits = control.limits().clone();
         match change.name.as_str() {
             "rate" => {
                 self.rate = number;
@@ -197,17 +196,13 @@ impl Settings {
                 control.set_period(1.0 / number);
             }
             "state_rate" => self.state_rate = number,
-            "damping" => control.set_damping(number),
-            "sweeps" => control.set_sweeps(number as usize),
-            "speed_limit" => limits.speed = limit,
-            "acceleration_limit" => limits.acceleration = limit,
-            "clearance" => limits.clearance = number,
-            _ => return,
-        }
-        if limits != *control.limits()
-            && let Err(error) = control.set_limits(limits)
-        {
-            tracing::warn!("{error}");
+            name => {
+                let is_none = number == NONE && name.ends_with("_limit");
+                let value = if is_none { f64::INFINITY } else { number };
+                if let Err(error) = set_parameter(control, name, value) {
+                    tracing::warn!("{error}");
+                }
+            }
         }
     }
 }

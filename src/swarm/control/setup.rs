@@ -68,7 +68,6 @@ pub fn watch(swarm: &Swarm, formation: &Formation, speed: f64) -> WatchLimits {
     }
 }
 
-/// The filter's limits, from the file.
 fn limits(raw: &RawLimits, flight: &RawFlight) -> Limits {
     Limits {
         brakes: matches!(flight.model, RawModel::DoubleIntegrator),
@@ -95,18 +94,11 @@ pub fn filter(swarm: &Swarm, formation: &Formation) -> Result<Filter, SceneError
         })
         .collect();
     let refuse = |error: SafetyError| {
-        let key = match &error {
-            SafetyError::Limit { name, .. } => format!("limits.{name}"),
-            SafetyError::Radius { .. } => "radius".into(),
-            SafetyError::Corners { place, .. }
-            | SafetyError::NotFinite { place }
-            | SafetyError::NoArea { place }
-            | SafetyError::Crossing { place, .. }
-            | SafetyError::TooDense { place, .. }
-            | SafetyError::Disc { place, .. } => match place {
-                Place::Geofence => "limits.geofence".into(),
-                Place::Obstacle(k) => format!("obstacles[{k}]"),
-            },
+        let key = match error.place {
+            Place::Limit(name) => format!("limits.{name}"),
+            Place::Radius(_) => "radius".into(),
+            Place::Geofence => "limits.geofence".into(),
+            Place::Obstacle(k) => format!("obstacles[{k}]"),
         };
         swarm.refuse(&key, error.to_string(), "correct the swarm file")
     };

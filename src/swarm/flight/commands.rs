@@ -3,7 +3,7 @@
 use super::Flight;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
-use crate::scene::swarm::raw::RawCommandKind;
+use crate::scene::swarm::raw::{RawCommand, RawCommandKind};
 use crate::swarm::control::Control;
 use crate::swarm::safety::Limits;
 
@@ -81,50 +81,39 @@ pub fn of(swarm: &Swarm, control: &Control) -> Result<Vec<(u64, FlightCommand)>,
     let formation = control.formation();
     let commands = &swarm.raw.flight.commands;
     if let Some(k) = commands.windows(2).position(|pair| pair[0].after > pair[1].after) {
-        let message = "comes before the command above it";
-        return Err(swarm.refuse(
-            &format!("flight.commands[{}].after", k + 1),
-            message,
-            "list by ascending period",
-        ));
+        let key = format!("flight.commands[{}].after", k + 1);
+        return Err(swarm.refuse(&key, "comes before the command above it", "list by ascending period"));
     }
-    let command = |(k, raw): (usize, &crate::scene::swarm::raw::RawCommand)| {
+    let command = |(k, raw): (usize, &RawCommand)| {
+        let key = |part: &str| format!("flight.commands[{k}].what.{part}");
+        let refuse = |part: &str, message: String, help: &str| Err(swarm.refuse(&key(part), message, help));
         let what = match &raw.what {
             RawCommandKind::Lead { robot, to } => {
-                let key = format!("flight.commands[{k}].what.robot");
-                let member = formation.require(swarm, &key, robot)?;
+                let member = formation.require(swarm, &key("robot"), robot)?;
                 if !formation.is_led(member) {
                     let message = format!("no program of this swarm leads `{robot}`");
-                    return Err(swarm.refuse(&key, message, "name a robot of [[leaders]]"));
+                    return refuse("robot", message, "name a robot of [[leaders]]");
                 }
                 if !control.is_believed(*to) {
                     let range = swarm.raw.poses.range;
                     let message =
                         format!("lies more than poses.range = {range} m from the formation's middle");
-                    let key = format!("flight.commands[{k}].what.to");
-                    return Err(swarm.refuse(
-                        &key,
-                        message,
-                        "no pose is believed there: lead to a nearer place, or raise poses.range",
-                    ));
+                    let help = "no pose is believed there: lead to a nearer place, or raise poses.range";
+                    return refuse("to", message, help);
                 }
                 FlightCommand::Lead { member, to: *to }
             }
             RawCommandKind::MoveObstacle { obstacle, by } => {
-                let key = format!("flight.commands[{k}].what");
                 let count = swarm.raw.obstacles.len();
                 if *obstacle >= count {
                     let message =
                         format!("there is no such obstacle: the swarm has {count}, numbered from 0");
-                    return Err(swarm.refuse(
-                        &format!("{key}.obstacle"),
-                        message,
-                        "name one of [[obstacles]]",
-                    ));
+                    return refuse("obstacle", message, "name one of [[obstacles]]");
                 }
-                control.filter().obstacles().with_moved(*obstacle, *by).map_err(|error| {
-                    swarm.refuse(&format!("{key}.by"), error.to_string(), "move it less far")
-                })?;
+                let moved = control.filter().obstacles().with_moved(*obstacle, *by);
+                if let Err(error) = moved {
+                    return refuse("by", error.to_string(), "move it less far");
+                }
                 FlightCommand::MoveObstacle { obstacle: *obstacle, by: *by }
             }
             RawCommandKind::Channel { noise, delay, loss } => {

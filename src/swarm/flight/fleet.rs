@@ -31,13 +31,7 @@ impl Fleet {
     pub fn new(swarm: &Swarm, formation: &Formation) -> Result<Self, SceneError> {
         let raw = &swarm.raw;
         let robots: Vec<Robot> = formation.starts(swarm)?.iter().map(|place| Robot::at(place, 0.0)).collect();
-        let params = ChannelParams {
-            noise: raw.flight.noise,
-            delay: raw.flight.delay,
-            jitter: raw.flight.jitter,
-            loss: raw.flight.loss,
-            duplication: raw.flight.duplicates,
-        };
+        let params = ChannelParams::of(&raw.flight);
         Ok(Self {
             channels: (0..robots.len()).map(|m| Channel::new(params, raw.flight.seed, m)).collect(),
             faults: faults::of(swarm, formation)?,

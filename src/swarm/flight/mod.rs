@@ -199,11 +199,8 @@ fn periods(swarm: &Swarm, control: &Control) -> Result<u64, SceneError> {
     };
     if periods > MOST {
         let message = format!("{why}is {periods:.3e} periods; a flight has {MOST:e} at most");
-        return Err(swarm.refuse(
-            "flight.duration",
-            message,
-            "give a shorter time, or a longer control.period",
-        ));
+        let help = "give a shorter time, or a longer control.period";
+        return Err(swarm.refuse("flight.duration", message, help));
     }
     Ok(periods as u64)
 }

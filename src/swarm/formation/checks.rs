@@ -82,11 +82,8 @@ pub fn require_apart(swarm: &Swarm, formation: &Formation) -> Result<(), SceneEr
                     "the places of `{}` and `{}` are {apart} m apart, and their radii and the clearance need {needed} m",
                     formation.names[j], formation.names[i]
                 );
-                return Err(swarm.refuse(
-                    "limits.clearance",
-                    message,
-                    "widen the formation, or lower the clearance or the radius",
-                ));
+                let help = "widen the formation, or lower the clearance or the radius";
+                return Err(swarm.refuse("limits.clearance", message, help));
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Members inside a body: how much each corner of the cell around a place has a share in it.
 
 use crate::flock::vectors::Vectors;
+use crate::geometry::point::{cross, dot, minus};
 use crate::material::cells::Cells;
 
 /// Shares of the corners of the cell that holds `place` \[length\]; `None` outside the body.
@@ -26,7 +27,7 @@ pub fn place(shares: &[(u32, f64)], present: &Vectors) -> [f64; 2] {
 /// Coordinates of a place with respect to the corners (counter-clockwise) of a convex polygon; `None` outside it.
 fn mean_value(corners: &[[f64; 2]], place: [f64; 2]) -> Option<Vec<f64>> {
     let count = corners.len();
-    let rays: Vec<[f64; 2]> = corners.iter().map(|c| [c[0] - place[0], c[1] - place[1]]).collect();
+    let rays: Vec<[f64; 2]> = corners.iter().map(|&corner| minus(corner, place)).collect();
     let lengths: Vec<f64> = rays.iter().map(|r| f64::hypot(r[0], r[1])).collect();
     let size = lengths.iter().copied().fold(0.0, f64::max);
     let tolerance = 1e-9 * size;
@@ -34,15 +35,15 @@ fn mean_value(corners: &[[f64; 2]], place: [f64; 2]) -> Option<Vec<f64>> {
         let mut all = vec![0.0; count];
         all[k] = share;
         all[(k + 1) % count] += next;
-        Some(all)
+        all
     };
     if let Some(k) = (0..count).find(|&k| lengths[k] <= tolerance) {
-        return only(k, 1.0, 0.0);
+        return Some(only(k, 1.0, 0.0));
     }
     let mut half_tangents = Vec::with_capacity(count);
     for k in 0..count {
         let (a, b) = (rays[k], rays[(k + 1) % count]);
-        let (cross, dot) = (a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1]);
+        let (cross, dot) = (cross(a, b), dot(a, b));
         let along = lengths[k] * lengths[(k + 1) % count];
         if cross < -tolerance * size {
             return None;
@@ -50,11 +51,7 @@ fn mean_value(corners: &[[f64; 2]], place: [f64; 2]) -> Option<Vec<f64>> {
         if cross <= tolerance * size {
             // On the line of a side: on the side itself, or outside.
             let whole = lengths[k] + lengths[(k + 1) % count];
-            return if dot < 0.0 {
-                only(k, lengths[(k + 1) % count] / whole, lengths[k] / whole)
-            } else {
-                None
-            };
+            return (dot < 0.0).then(|| only(k, lengths[(k + 1) % count] / whole, lengths[k] / whole));
         }
         half_tangents.push((along - dot) / cross);
     }

@@ -216,20 +216,16 @@ fn leads(
     for (k, entry) in swarm.leaders.iter().enumerate() {
         let members = match &entry.robots {
             Picked::Region(region) => pick(k, region)?,
-            Picked::Names(wanted) => wanted
-                .iter()
-                .enumerate()
-                .map(|(n, name)| {
+            Picked::Names(wanted) => {
+                let number = |(n, name): (usize, &String)| {
                     names.iter().position(|known| known == name).ok_or_else(|| {
+                        let key = format!("leaders[{k}].robots[{n}]");
                         let message = format!("there is no robot `{name}`; the first is `{}`", names[0]);
-                        swarm.refuse(
-                            &format!("leaders[{k}].robots[{n}]"),
-                            message,
-                            "name a robot of this swarm",
-                        )
+                        swarm.refuse(&key, message, "name a robot of this swarm")
                     })
-                })
-                .collect::<Result<_, _>>()?,
+                };
+                wanted.iter().enumerate().map(number).collect::<Result<_, _>>()?
+            }
         };
         if let Program::Individual(tracks) = &entry.program
             && let Some((name, _)) = tracks.iter().find(|(name, _)| !names.contains(name))
@@ -259,11 +255,8 @@ fn lead(
         Program::Individual(tracks) => {
             let track = tracks.iter().find(|(known, _)| known == name).ok_or_else(|| {
                 let key = format!("leaders[{entry}].program.path");
-                swarm.refuse(
-                    &key,
-                    format!("the file has no rows for `{name}`"),
-                    "give every leader rows of its own",
-                )
+                let message = format!("the file has no rows for `{name}`");
+                swarm.refuse(&key, message, "give every leader rows of its own")
             })?;
             Lead::Motion { motion: track.1.clone(), since: 0.0 }
         }

@@ -23,6 +23,7 @@ use crate::flock::role::Role;
 use crate::flock::rules::Mean;
 use crate::flock::strain::{Strain, strain};
 use crate::flock::vectors::{Vectors, distance};
+use crate::geometry::point::{minus, plus};
 use crate::scene::swarm::NamedManoeuvre;
 use crate::swarm::resilience::{Trim, supported, trim};
 use crate::sweep::Order;
@@ -295,10 +296,7 @@ impl Formation {
         let place = self.places.get(member);
         Some(match self.leads[member].as_ref()? {
             Lead::External(moved) => *moved,
-            Lead::Motion { motion, since } => {
-                let [dx, dy] = motion.displacement(time - since, 0, place);
-                [place[0] + dx, place[1] + dy]
-            }
+            Lead::Motion { motion, since } => plus(place, motion.displacement(time - since, 0, place)),
             Lead::Manoeuvre { manoeuvre, since } => manoeuvre.affine(time - since).apply(place),
         })
     }
@@ -384,7 +382,7 @@ impl Formation {
         let lists = (0..self.count()).map(|m| self.neighbours(m).map(|k| k as u32).collect::<Vec<_>>());
         let leaders: Vec<bool> = (0..self.count()).map(|m| self.leads(m)).collect();
         supported(&Neighbours::from_lists(lists), &leaders, liars, self.trim())
-            .map_err(|unsupported| format!("`{}` {unsupported}", self.names[unsupported.member()]))
+            .map_err(|unsupported| format!("`{}` {unsupported}", self.names[unsupported.member]))
     }
 
     /// The neighbours of a member among the members.
@@ -399,16 +397,12 @@ impl Formation {
 
     /// Each member's place \[m\] where all leaders are sent the same way from theirs by `time` \[s\].
     pub fn moved_together(&self, time: f64) -> Option<Vectors> {
-        let by = |m: usize| {
-            let (to, from) = (self.led_to(m, time)?, self.places.get(m));
-            Some([to[0] - from[0], to[1] - from[1]])
-        };
+        let by = |m: usize| Some(minus(self.led_to(m, time)?, self.places.get(m)));
         let mut all = (0..self.count()).filter_map(by);
         let first = all.next()?;
-        let size = |[x, y]: [f64; 2]| x.hypot(y);
-        let rounding = 1e-9 * (size(first) + self.spacing);
+        let rounding = 1e-9 * (distance(first, [0.0; 2]) + self.spacing);
         all.all(|way| distance(way, first) <= rounding)
-            .then(|| self.places.iter().map(|[x, y]| [x + first[0], y + first[1]]).collect())
+            .then(|| self.places.iter().map(|place| plus(place, first)).collect())
     }
 
     /// Why no place of rest behind the leaders is known.
@@ -423,16 +417,12 @@ impl Formation {
         let settling = self.settling.as_ref().ok()?;
         let of_particle = |i: usize| {
             let m = particles.binary_search(&i).ok()?;
-            let (now, then) = (present.get(m), self.places.get(m));
-            Some([now[0] - then[0], now[1] - then[1]])
+            Some(minus(present.get(m), self.places.get(m)))
         };
         let displaced = settling.displacements(of_particle);
         let mut rest: Vectors = self.places.clone();
         for (m, &i) in particles.iter().enumerate() {
-            match displaced[i] {
-                Some(u) => rest.set(m, [self.places.x[m] + u[0], self.places.y[m] + u[1]]),
-                None => rest.set(m, present.get(m)),
-            }
+            rest.set(m, displaced[i].map_or_else(|| present.get(m), |by| plus(self.places.get(m), by)));
         }
         Some(rest)
     }
@@ -493,7 +483,6 @@ pub struct Among {
     pub is_one_lost: bool,
     /// Whether it left out any by where they are seen.
     pub is_trimmed: bool,
-    /// The neighbours that are heard.
     heard: Vec<usize>,
     /// The points of the frame that it looks at, of those that are heard alone. A liar would have a vote more with each point that
     /// copies it: where liars are tolerated there are none.
@@ -508,10 +497,7 @@ impl Among {
     fn target(&self, engine: &Engine, particles: &[usize], how: Trim) -> ([f64; 2], bool) {
         let (flock, before, reference) = (engine.flock(), engine.previous(), &engine.body().reference);
         let particle = particles[self.member];
-        let displacement = |m: usize| {
-            let ([x, y], from) = (before.get(particles[m]), reference.get(particles[m]));
-            [x - from[0], y - from[1]]
-        };
+        let displacement = |m: usize| minus(before.get(particles[m]), reference.get(particles[m]));
         let mut keep = vec![[true; 2]; self.heard.len()];
         if self.liars > 0 {
             let all: Vec<[f64; 2]> = self.heard.iter().map(|&m| displacement(m)).collect();

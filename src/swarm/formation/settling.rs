@@ -19,7 +19,6 @@ pub struct Settling {
     /// Number of each particle among the followers or among the leaders, shape \[particles\].
     number: Vec<Option<usize>>,
     follows: Vec<bool>,
-    /// Particles that lead.
     leaders: Vec<usize>,
     /// Displacement of the followers for one of the leaders, shape \[2 followers, 2 leaders\].
     answer: DMatrix<f64>,

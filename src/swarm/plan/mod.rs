@@ -281,7 +281,6 @@ fn needed(formation: &Formation, name: &str) -> Option<ManoeuvreSpeed> {
     Some(ManoeuvreSpeed { name: name.to_owned(), needed })
 }
 
-/// A loop whose disturbances last.
 fn lasting(plan: &SwarmPlan) -> Option<String> {
     let Some(Convergence { factor, half_life_s: None }) = plan.convergence else { return None };
     Some(format!("disturbances do not die out: {factor:.4} of the slowest is left after a period"))

@@ -38,8 +38,6 @@ fn more_sweeps_shorten_the_lag_and_delay_lengthens_the_half_life() {
 
 #[test]
 fn what_the_file_cannot_hold_is_warned_of() {
-    let hurried = plan("square", &["limits.speed=0.1"]);
-    assert!(hurried.cautions.iter().any(|caution| caution.contains("`turn`")), "{hurried}");
     let noisy = plan("square", &["flight.noise=0.5"]);
     assert!(noisy.cautions.iter().any(|caution| caution.contains("flight.noise")), "{noisy}");
     let late = plan("square", &["flight.delay=100"]);

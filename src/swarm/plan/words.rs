@@ -77,19 +77,11 @@ impl fmt::Display for SwarmPlan {
                 format!("a follower moves by up to {gain:.3} of the poses' standard deviation"),
             )?,
         }
-        let simulated = self.noise.simulated;
-        match self.noise.largest {
-            Some(largest) => line(
-                "noise margin",
-                format!(
-                    "{largest:.4} m until the clearance holds robots at their places; simulated {simulated} m"
-                ),
-            )?,
-            None => line(
-                "noise margin",
-                format!("no two robots have a clearance to keep; simulated {simulated} m"),
-            )?,
-        }
+        let held = match self.noise.largest {
+            Some(largest) => format!("{largest:.4} m until the clearance holds robots at their places"),
+            None => "no two robots have a clearance to keep".to_owned(),
+        };
+        line("noise margin", format!("{held}; simulated {} m", self.noise.simulated))?;
         let SpeedMargin { limit, lag_s, reachable, manoeuvres } = &self.speed;
         line("speed limit", limit.map_or("none".into(), |limit| format!("{limit} m/s")))?;
         if let Some(lag) = lag_s {

@@ -10,50 +10,26 @@
 use super::Trim;
 use crate::flock::neighbourhood::Neighbours;
 
-/// The reason for which so many liars are not tolerated. The texts describe the member without naming it.
+/// The reason for which so many liars are not tolerated. The text describes the member without naming it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Unsupported {
-    /// A follower has too few neighbours.
-    #[error(
-        "has {neighbours} neighbours, and {needed} are needed to tolerate F = {f} liars (on a lattice 8 each \
-         tolerate 1, 24 tolerate 3)"
-    )]
-    TooFewNeighbours {
-        /// Number of the follower.
-        member: usize,
-        /// Neighbours that it has.
-        neighbours: usize,
-        /// Neighbours that it needs.
-        needed: usize,
-        /// Liars to be tolerated.
-        f: usize,
-    },
-    /// A follower has enough neighbours, but too few of them are sure to be reached from the leaders.
-    #[error(
-        "has {neighbours} neighbours of which only {reached} are sure to receive the leaders' values, and \
-         {needed} are needed to tolerate F = {f} liars (on a lattice 8 each tolerate 1, 24 tolerate 3)"
-    )]
-    NotReached {
-        /// Number of the follower.
-        member: usize,
-        /// Neighbours that it has.
-        neighbours: usize,
-        /// Those of them that are sure.
-        reached: usize,
-        /// Sure neighbours that it needs.
-        needed: usize,
-        /// Liars to be tolerated.
-        f: usize,
-    },
-}
-
-impl Unsupported {
-    /// The member that the reason is about.
-    pub fn member(&self) -> usize {
-        match *self {
-            Self::TooFewNeighbours { member, .. } | Self::NotReached { member, .. } => member,
-        }
-    }
+#[error(
+    "has {neighbours} neighbours{}, and {needed} are needed to tolerate F = {f} liars (on a lattice 8 each \
+     tolerate 1, 24 tolerate 3)",
+    reached.map_or(String::new(), |reached| format!(
+        " of which only {reached} are sure to receive the leaders' values"
+    ))
+)]
+pub struct Unsupported {
+    /// Number of the follower.
+    pub member: usize,
+    /// Neighbours that it has.
+    pub neighbours: usize,
+    /// Those of them that are sure to be reached from the leaders; `None` where all would be too few.
+    pub reached: Option<usize>,
+    /// Sure neighbours that it needs.
+    pub needed: usize,
+    /// Liars to be tolerated.
+    pub f: usize,
 }
 
 /// Whether the leaders' values reach all followers (all members but the `leaders`), whichever `f` neighbours of
@@ -69,24 +45,16 @@ pub fn supported(neighbours: &Neighbours, leaders: &[bool], f: usize, trim: Trim
     let is_follower = |member: &usize| !leaders[*member];
     let members = || (0..neighbours.count()).filter(is_follower);
     let heard = |member: usize| neighbours.of(member).len();
+    let unsupported =
+        |member, reached| Err(Unsupported { member, neighbours: heard(member), reached, needed, f });
     if let Some(member) = members().find(|&member| heard(member) < needed) {
-        return Err(Unsupported::TooFewNeighbours { member, neighbours: heard(member), needed, f });
+        return unsupported(member, None);
     }
     let (sure, reached) = percolate(neighbours, leaders, needed);
     // The member with the fewest neighbours missing: there the remedy is smallest.
-    match members()
-        .filter(|&member| !sure[member])
-        .max_by_key(|&member| (reached[member], usize::MAX - member))
-    {
-        None => Ok(()),
-        Some(member) => Err(Unsupported::NotReached {
-            member,
-            neighbours: heard(member),
-            reached: reached[member],
-            needed,
-            f,
-        }),
-    }
+    let missed = members().filter(|&member| !sure[member]);
+    let nearest = missed.max_by_key(|&member| (reached[member], usize::MAX - member));
+    nearest.map_or(Ok(()), |member| unsupported(member, Some(reached[member])))
 }
 
 /// Starts from the leaders and adds members with enough neighbours in the set until none is left to add. Returns
@@ -160,12 +128,11 @@ mod tests {
     fn a_refusal_names_the_member_and_what_it_lacks() {
         let four = square(Neighbourhood::First { keep: None });
         let refusal = supported(&four, &ring(), 1, Trim::PerAxis).expect_err("two of four lead at best");
-        let expected = Unsupported::NotReached { member: 11, neighbours: 4, reached: 2, needed: 3, f: 1 };
+        let expected = Unsupported { member: 11, neighbours: 4, reached: Some(2), needed: 3, f: 1 };
         assert_eq!(refusal, expected);
         assert!(refusal.to_string().contains("4 neighbours of which only 2"), "{refusal}");
-        assert_eq!(refusal.member(), 11);
         let refusal = supported(&four, &columns(1), 2, Trim::PerAxis).expect_err("four at most");
-        let expected = Unsupported::TooFewNeighbours { member: 10, neighbours: 3, needed: 5, f: 2 };
+        let expected = Unsupported { member: 10, neighbours: 3, reached: None, needed: 5, f: 2 };
         assert_eq!(refusal, expected);
     }
 
@@ -174,7 +141,7 @@ mod tests {
         let chain = Neighbours::from_lists([vec![], vec![0], vec![1], vec![4], vec![3]]);
         let leaders = [true, false, false, false, false];
         let refusal = supported(&chain, &leaders, 0, Trim::PerAxis).expect_err("two hear each other only");
-        assert!(matches!(refusal, Unsupported::NotReached { member: 3, reached: 0, .. }), "{refusal:?}");
+        assert!(matches!(refusal, Unsupported { member: 3, reached: Some(0), .. }), "{refusal:?}");
         assert_eq!(supported(&chain, &[true, false, false, true, false], 0, Trim::PerAxis), Ok(()));
     }
 

@@ -12,14 +12,7 @@ pub struct Integrator {
 impl Integrator {
     /// Straight towards the target, so it stays in every convex cell that holds both; never past it.
     pub fn step(&self, robot: &mut Robot, target: [f64; 2], dt: f64) {
-        let offset = robot.offset_to(target);
-        let (length, reach) = (offset[0].hypot(offset[1]), self.speed * dt);
-        let place = if length <= reach {
-            target
-        } else {
-            [0, 1].map(|k| robot.position[k] + offset[k] * (reach / length))
-        };
-        robot.move_to(place, dt);
+        robot.approach(target, self.speed * dt, dt);
     }
 }
 

@@ -84,6 +84,15 @@ impl Robot {
         [target[0] - self.position[0], target[1] - self.position[1]]
     }
 
+    /// Moves straight towards the target, no farther than `reach` \[m\] and never past it.
+    fn approach(&mut self, target: [f64; 2], reach: f64, dt: f64) {
+        let offset = self.offset_to(target);
+        let length = offset[0].hypot(offset[1]);
+        let on_the_way = || [0, 1].map(|k| self.position[k] + offset[k] * (reach / length));
+        let place = if length <= reach { target } else { on_the_way() };
+        self.move_to(place, dt);
+    }
+
     /// Puts the robot at `place`; its velocity is the mean over the period.
     fn move_to(&mut self, place: [f64; 2], dt: f64) {
         self.velocity = self.offset_to(place).map(|d| d / dt);

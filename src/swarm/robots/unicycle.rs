@@ -27,8 +27,7 @@ impl Unicycle {
     /// The controls switch once within the period: turning, then driving for what is left of it.
     pub fn step(&self, robot: &mut Robot, target: [f64; 2], dt: f64) {
         let offset = robot.offset_to(target);
-        let length = offset[0].hypot(offset[1]);
-        if length <= self.tolerance {
+        if offset[0].hypot(offset[1]) <= self.tolerance {
             robot.velocity = [0.0; 2];
             return;
         }
@@ -42,13 +41,7 @@ impl Unicycle {
         }
         robot.yaw = heading;
         let left = if turn == 0.0 { dt } else { dt - turn.abs() / self.turn_rate };
-        let reach = self.speed * left;
-        let place = if length <= reach {
-            target
-        } else {
-            [0, 1].map(|k| robot.position[k] + offset[k] * (reach / length))
-        };
-        robot.move_to(place, dt);
+        robot.approach(target, self.speed * left, dt);
     }
 }
 

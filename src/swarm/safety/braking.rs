@@ -6,7 +6,7 @@
 
 use super::cell::{length, shortened};
 use super::filter::{Filter, Flags, Seen};
-use crate::geometry::point::dot;
+use crate::geometry::point::{dot, minus, plus};
 use crate::swarm::robots::DoubleIntegrator;
 
 /// Halvings of the interval between braking and the wanted velocity: a step is exact to one part in 2 to this power.
@@ -27,7 +27,7 @@ impl Filter {
     pub(super) fn resting_place(&self, seen: &Seen, period: f64, member: usize) -> [f64; 2] {
         let here = seen.present.get(member);
         let way = self.velocity(seen, member).map_or([0.0; 2], |v| self.braking().braking_way(v, period));
-        [here[0] + way[0], here[1] + way[1]]
+        plus(here, way)
     }
 
     /// The place at which the member was last sent to come to rest, relative to it \[m\], and how far noise may put the one at
@@ -35,7 +35,7 @@ impl Filter {
     pub(super) fn promised(&self, seen: &Seen, member: usize) -> ([f64; 2], f64) {
         let (here, last) = (seen.present.get(member), self.sent.get(member));
         let error = seen.strays.map_or(0.0, |strays| strays[member].error);
-        ([last[0] - here[0], last[1] - here[1]], error)
+        (minus(last, here), error)
     }
 
     /// The place to come to rest at \[m\], relative to the member, with the step towards `goal` after which it still
@@ -50,21 +50,15 @@ impl Filter {
     ) -> [f64; 2] {
         let dynamics = self.braking();
         let half = velocity.map(|v| 0.5 * period * v);
-        let rest = |next: [f64; 2]| {
-            let covered = dynamics.covered(next, period);
-            [half[0] + covered[0], half[1] + covered[1]]
-        };
+        let rest = |next: [f64; 2]| plus(half, dynamics.covered(next, period));
         let most = self.limits.acceleration * period;
-        let steered = |next: [f64; 2]| {
-            let change = shortened([next[0] - velocity[0], next[1] - velocity[1]], most);
-            [velocity[0] + change[0], velocity[1] + change[1]]
-        };
+        let steered = |next: [f64; 2]| plus(velocity, shortened(minus(next, velocity), most));
         let braked = steered([0.0; 2]);
-        let wanted = dynamics.approach([goal[0] - half[0], goal[1] - half[1]], period);
+        let wanted = dynamics.approach(minus(goal, half), period);
         let next = steered(wanted);
         let mut stop = rest(braked);
         // Noise that moves the place is no leave to go there: as often as it moves it on, it would go on.
-        if length([promised[0] - stop[0], promised[1] - stop[1]]) <= error {
+        if length(minus(promised, stop)) <= error {
             stop = promised;
         }
         // A member outside its cell goes no further out than it has to.
@@ -80,8 +74,7 @@ impl Filter {
         let end = rest(next);
         if holds(end) {
             // The goal to the last bit, where only the goal bounds the step.
-            let arrives =
-                next == wanted && length([end[0] - goal[0], end[1] - goal[1]]) <= 1e-12 * length(goal);
+            let arrives = next == wanted && length(minus(end, goal)) <= 1e-12 * length(goal);
             return if arrives && holds(goal) { goal } else { end };
         }
         flags.0 |= Flags::ACCELERATION_LIMITED;

@@ -4,7 +4,7 @@
 //! Everything is relative to the member's own place, so that a half-plane whose offset is not
 //! negative contains the member, and a cell of such half-planes is never empty.
 
-use crate::geometry::point::dot;
+use crate::geometry::point::{dot, minus};
 
 /// The points `x` with `normal . x <= offset` \[m\], relative to the member.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,7 +54,10 @@ impl Cell {
     pub fn nearest(&self, wanted: [f64; 2], reach: f64) -> [f64; 2] {
         let shares = if self.is_left() { &SHARES[..] } else { &SHARES[..1] };
         let found = shares.iter().find_map(|&share| self.projection(wanted, reach, share));
-        found.map_or([0.0; 2], |point| self.cut(point))
+        let point = found.unwrap_or_default();
+        // Cut where it leaves a half-plane, whatever rounding did before.
+        let share = self.share(point);
+        [share * point[0], share * point[1]]
     }
 
     /// Projection of `wanted` onto the cell whose negative offsets count only this share, and onto the
@@ -102,12 +105,6 @@ impl Cell {
         Some([foot[0] + at * along[0], foot[1] + at * along[1]])
     }
 
-    /// Cuts the way to `point` where it leaves a half-plane, whatever rounding did before.
-    fn cut(&self, point: [f64; 2]) -> [f64; 2] {
-        let share = self.share(point);
-        [share * point[0], share * point[1]]
-    }
-
     /// The share of the straight way to `point` \[m\] that leads no further out of any half-plane \[1\].
     pub fn share(&self, point: [f64; 2]) -> f64 {
         let length = length(point);
@@ -147,7 +144,7 @@ pub fn shortened(way: [f64; 2], most: f64) -> [f64; 2] {
 
 /// The point of a segment that is nearest to a place.
 pub(in crate::swarm) fn foot([a, b]: [[f64; 2]; 2], place: [f64; 2]) -> [f64; 2] {
-    let (along, way) = ([b[0] - a[0], b[1] - a[1]], [place[0] - a[0], place[1] - a[1]]);
+    let (along, way) = (minus(b, a), minus(place, a));
     let square = dot(along, along);
     let share = if square > 0.0 { (dot(along, way) / square).clamp(0.0, 1.0) } else { 0.0 };
     [a[0] + share * along[0], a[1] + share * along[1]]
@@ -163,7 +160,7 @@ pub fn nearest(first: [[f64; 2]; 2], second: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
         [first[1], foot(second, first[1])],
         [foot(first, second[1]), second[1]],
     ];
-    let apart = |[a, b]: &[[f64; 2]; 2]| dot([b[0] - a[0], b[1] - a[1]], [b[0] - a[0], b[1] - a[1]]);
+    let apart = |[a, b]: &[[f64; 2]; 2]| dot(minus(*b, *a), minus(*b, *a));
     ways.into_iter().min_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap_or(ways[0])
 }
 
@@ -172,6 +169,7 @@ mod tests {
     use std::f64::consts::{FRAC_PI_2, PI};
 
     use super::*;
+    use crate::geometry::point::distance;
     use proptest::prelude::*;
 
     fn cell(planes: &[(f64, f64)]) -> Cell {
@@ -181,10 +179,6 @@ mod tests {
                 .map(|&(angle, offset)| HalfPlane { normal: [angle.cos(), angle.sin()], offset })
                 .collect(),
         }
-    }
-
-    fn apart(a: [f64; 2], b: [f64; 2]) -> f64 {
-        length([a[0] - b[0], a[1] - b[1]])
     }
 
     proptest! {
@@ -208,7 +202,7 @@ mod tests {
                 for size in [1e-6, 1e-2, 1.0] {
                     let other = [found[0] + scale * size * x, found[1] + scale * size * y];
                     if cell.excess(other) <= 0.0 && length(other) <= reach {
-                        let gain = apart(wanted, found) - apart(wanted, other);
+                        let gain = distance(wanted, found) - distance(wanted, other);
                         prop_assert!(gain <= 1e-9 * scale, "{other:?} beats {found:?} by {gain}");
                     }
                 }
@@ -237,7 +231,7 @@ mod tests {
         let point = cell(&[(east, 0.0), (north, 0.0), (west, 0.0), (south, 0.0)]);
         assert!(length(point.nearest([2.0, 1.0], 9.0)) < 1e-12);
         let line = cell(&[(east, 0.0), (west, 0.0), (east, 0.0)]);
-        assert!(apart(line.nearest([2.0, 1.0], 9.0), [0.0, 1.0]) < 1e-12);
+        assert!(distance(line.nearest([2.0, 1.0], 9.0), [0.0, 1.0]) < 1e-12);
         let needle = cell(&[(1e-9, 0.0), (west, 0.0)]);
         assert!(needle.nearest([2.0, 1.0], 9.0)[0].abs() < 1e-8);
     }
@@ -245,11 +239,11 @@ mod tests {
     #[test]
     fn a_member_outside_two_half_planes_comes_back_into_both_or_stays_between() {
         let corner = cell(&[(0.0, -0.5), (FRAC_PI_2, -0.25)]);
-        assert!(apart(corner.nearest([3.0, 3.0], 9.0), [-0.5, -0.25]) < 1e-12);
+        assert!(distance(corner.nearest([3.0, 3.0], 9.0), [-0.5, -0.25]) < 1e-12);
         let trap = cell(&[(0.0, -0.5), (PI, -0.25)]);
         assert!(trap.nearest([3.0, 0.0], 9.0)[0].abs() < 1e-12);
         let far = cell(&[(0.0, -0.5)]);
-        assert!(apart(far.nearest([3.0, 0.0], 0.125), [-0.125, 0.0]) < 1e-9, "as far as in reach");
+        assert!(distance(far.nearest([3.0, 0.0], 0.125), [-0.125, 0.0]) < 1e-9, "as far as in reach");
     }
 
     #[test]

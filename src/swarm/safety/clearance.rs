@@ -3,6 +3,7 @@
 use super::Filter;
 use super::cell::{foot, length};
 use crate::flock::vectors::Vectors;
+use crate::geometry::point::minus;
 
 /// Chords that stand for the way of a member that changes its velocity evenly: between them it is off by less than `a T^2 / 2048`.
 const CHORDS: u32 = 16;
@@ -52,10 +53,7 @@ impl Filter {
         }
         for a in 0..after.len() {
             for b in 0..a {
-                let apart = |points: &Vectors| {
-                    let (a, b) = (points.get(a), points.get(b));
-                    [a[0] - b[0], a[1] - b[1]]
-                };
+                let apart = |points: &Vectors| minus(points.get(a), points.get(b));
                 let gap =
                     length(foot([apart(before), apart(after)], [0.0; 2])) - self.radii[a] - self.radii[b];
                 nearest[a] = nearest[a].min(gap);

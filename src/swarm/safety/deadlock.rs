@@ -10,24 +10,11 @@
 use super::cell::length;
 use crate::geometry::point::dot;
 
-/// Conditions for the detour of a blocked member.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Patience {
-    /// Ticks without progress before a detour, and with progress before it ends; default 3. At 0 no
-    /// member makes a detour.
-    pub ticks: u32,
-    /// Share \[1\] of the way a member could make in a tick (at most its own size) below which it is
-    /// blocked; default 0.1.
-    pub blocked: f64,
-    /// The same, above which its way is free; default 0.5.
-    pub free: f64,
-}
+/// Share of the way a member could make in a tick (at most its own size) below which it is blocked \[1\].
+const BLOCKED: f64 = 0.1;
 
-impl Default for Patience {
-    fn default() -> Self {
-        Self { ticks: 3, blocked: 0.1, free: 0.5 }
-    }
-}
+/// The same, above which its way is free \[1\].
+const FREE: f64 = 0.5;
 
 /// One member's memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -73,19 +60,19 @@ impl Detour {
         [cos * wanted[0] - sin * wanted[1], sin * wanted[0] + cos * wanted[1]]
     }
 
-    /// Takes note of a tick.
-    pub fn update(&mut self, patience: &Patience, tick: &Tick) {
+    /// Takes note of a tick; `patience` is that of [`Limits`](super::Limits).
+    pub fn update(&mut self, patience: u32, tick: &Tick) {
         let Tick { scale, wanted, distance, straight, direct, moved } = *tick;
         let progress = dot(direct, wanted) / (distance * scale);
         // Sliding back to where the detour began is no progress: the way is free that leads straight on,
         // or past something from a place nearer to the goal.
-        let is_free = straight > patience.free || (progress > patience.free && distance < self.begun);
+        let is_free = straight > FREE || (progress > FREE && distance < self.begun);
         let speaks_for_change = match self.turn {
-            0 => progress < patience.blocked,
-            _ => is_free || length(moved) < patience.blocked * scale,
+            0 => progress < BLOCKED,
+            _ => is_free || length(moved) < BLOCKED * scale,
         };
         self.ticks = if speaks_for_change { self.ticks + 1 } else { 0 };
-        if patience.ticks == 0 || self.ticks < patience.ticks {
+        if patience == 0 || self.ticks < patience {
             return;
         }
         self.ticks = 0;

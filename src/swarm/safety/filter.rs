@@ -2,14 +2,14 @@
 
 use super::cell::{Cell, HalfPlane, length, shortened};
 use super::deadlock::Detour;
-use super::limits::{Limits, SafetyError};
+use super::limits::{Limits, Place, SafetyError};
 use super::obstacles::Obstacles;
 use super::step::TOUCHING;
 use super::ways::Ways;
 use crate::flock::grid::CellGrid;
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::vectors::{Vectors, distance};
-use crate::geometry::point::{dot, minus};
+use crate::geometry::point::{dot, minus, plus};
 
 /// The reasons for changing a target, and other events of a tick, as bits that may be combined; those of the message `flockform_msgs/MemberState`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -98,7 +98,6 @@ pub(super) struct Crowd {
     /// Pairs of members within `listed` \[m\] of each other.
     neighbours: Neighbours,
     listed: f64,
-    /// Whether a member was ever seen.
     seen: Vec<bool>,
     /// Largest drift of a member from its pose \[m\].
     drift: f64,
@@ -129,7 +128,8 @@ impl Filter {
         limits.check()?;
         let wrong = radii.iter().position(|radius| !(radius.is_finite() && *radius >= 0.0));
         if let Some(member) = wrong {
-            return Err(SafetyError::Radius { member, radius: radii[member] });
+            let fault = format!(" = {} m: give a number from 0 up", radii[member]);
+            return Err(Place::Radius(member).refused(fault));
         }
         let fence = limits.geofence.as_deref().map(Obstacles::fence).transpose()?.unwrap_or_default();
         Ok(Self {
@@ -287,25 +287,23 @@ impl Filter {
             // Nothing says that it has gone on by a limit that was higher.
             if !self.earlier.is_empty() {
                 let most = self.limits.speed * (period + self.ahead(seen, member));
-                let step = shortened(minus(target, here), most);
-                return [here[0] + step[0], here[1] + step[1]];
+                return plus(here, shortened(minus(target, here), most));
             }
             return target;
         }
-        let way = [target[0] - last[0], target[1] - last[1]];
+        let way = minus(target, last);
         let step = shortened(way, self.limits.speed * period);
         if step == way {
             return target;
         }
         flags.0 |= Flags::SPEED_LIMITED;
-        let place = [last[0] + step[0], last[1] + step[1]];
+        let place = plus(last, step);
         // One that lags behind its targets need not have the cell in which the last one was.
         let out = minus(place, here);
         let leaves =
             |plane: &HalfPlane| dot(plane.normal, out) > plane.offset.max(0.0) + TOUCHING * length(out);
         if !self.limits.arrives && self.cell.planes.iter().any(leaves) {
-            let step = shortened(minus(target, here), self.limits.speed * period);
-            return [here[0] + step[0], here[1] + step[1]];
+            return plus(here, shortened(minus(target, here), self.limits.speed * period));
         }
         place
     }
@@ -377,8 +375,7 @@ impl Filter {
         if self.radii.len() < GRID_FROM {
             let here = seen.present.get(member);
             for (other, there) in seen.present.iter().enumerate() {
-                let way = [there[0] - here[0], there[1] - here[1]];
-                if other != member && ever_seen[other] && length(way) <= radius {
+                if other != member && ever_seen[other] && length(minus(there, here)) <= radius {
                     found.push(other as u32);
                 }
             }

@@ -1,7 +1,5 @@
 //! The limits that robots have to keep.
 
-use super::deadlock::Patience;
-
 /// The limits that the filter enforces on every member.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits {
@@ -29,8 +27,9 @@ pub struct Limits {
     /// Polygon that every member's disc stays inside \[m, world frame\], vertices in order, either way
     /// round, convex or not; default none.
     pub geofence: Option<Vec<[f64; 2]>>,
-    /// Conditions for a blocked member's detour; default after 3 ticks.
-    pub patience: Patience,
+    /// Ticks without progress before a blocked member makes a detour, and with progress before that ends; default 3. At 0
+    /// no member makes one.
+    pub patience: u32,
 }
 
 impl Default for Limits {
@@ -44,114 +43,59 @@ impl Default for Limits {
             keeps_apart: true,
             clearance: 0.0,
             geofence: None,
-            patience: Patience::default(),
+            patience: 3,
         }
     }
 }
 
 /// Error building a filter.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SafetyError {
-    /// A limit is out of its range.
-    #[error("limit `{name}` = {value}: give a number {range}, or leave it out for {default}")]
-    Limit {
-        /// Which limit.
-        name: &'static str,
-        /// The given value, in the limit's unit.
-        value: f64,
-        /// The range, in words.
-        range: &'static str,
-        /// The default, in words.
-        default: &'static str,
-    },
-    /// A member's radius is negative or not finite.
-    #[error("radius of member {member} = {radius} m: give a number from 0 up")]
-    Radius {
-        /// Number of the member.
-        member: usize,
-        /// The given value \[m\].
-        radius: f64,
-    },
-    /// A polygon of one or two corners, or none.
-    #[error("{place} has {count} corners: give at least 3")]
-    Corners {
-        /// Which shape.
-        place: Place,
-        /// Corners that it has.
-        count: usize,
-    },
-    /// A shape has a number that is not finite, or too large to compute with.
-    #[error("{place} has a number that is not finite or beyond 1e100 m: give finite coordinates in metres")]
-    NotFinite {
-        /// Which shape.
-        place: Place,
-    },
-    /// A polygon's corners lie on one line, to rounding.
-    #[error("{place} has no area: give corners that do not lie on one line")]
-    NoArea {
-        /// Which shape.
-        place: Place,
-    },
-    /// Two edges of a polygon cross or touch that are no neighbours.
-    #[error("{place}: edges {first} and {second} (from 0) cross: give corners in order around the shape")]
-    Crossing {
-        /// Which shape.
-        place: Place,
-        /// Number of one edge, from 0.
-        first: usize,
-        /// Number of the other edge, from 0.
-        second: usize,
-    },
-    /// So many edges run side by side that to compare each with those beside it would take minutes.
-    #[error(
-        "{place}: too many of its {count} edges run side by side to be checked for crossings: give fewer corners"
-    )]
-    TooDense {
-        /// Which shape.
-        place: Place,
-        /// Number of edges.
-        count: usize,
-    },
-    /// A disc has no size.
-    #[error("{place} has radius {radius} m: give a positive number")]
-    Disc {
-        /// Which shape.
-        place: Place,
-        /// The given value \[m\].
-        radius: f64,
-    },
+#[error("{place}{fault}")]
+pub struct SafetyError {
+    /// The number or shape that is at fault.
+    pub place: Place,
+    /// The fault and the remedy, as they follow its name.
+    pub fault: String,
 }
 
-/// The shape that an error is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The number or shape that an error is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Place {
+    /// A limit, by its name.
+    #[error("limit `{0}`")]
+    Limit(&'static str),
+    /// The radius of a member, by its number.
+    #[error("radius of member {0}")]
+    Radius(usize),
     /// The polygon that all members stay inside.
+    #[error("the geofence")]
     Geofence,
     /// By its index in the list of obstacles.
+    #[error("obstacle {0} (from 0)")]
     Obstacle(usize),
 }
 
-impl std::fmt::Display for Place {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Place::Geofence => write!(f, "the geofence"),
-            Place::Obstacle(index) => write!(f, "obstacle {index} (from 0)"),
-        }
+impl Place {
+    /// Refuses it, for a fault that is worded as it follows its name.
+    pub(super) fn refused(self, fault: impl Into<String>) -> SafetyError {
+        SafetyError { place: self, fault: fault.into() }
     }
 }
 
 impl Limits {
     /// Refuses limits that are negative or not numbers.
     pub(super) fn check(&self) -> Result<(), SafetyError> {
-        let positive = [("speed", self.speed), ("acceleration", self.acceleration)];
-        for (name, value) in positive {
+        let refused = |name, value: f64, range: &str| {
+            Err(Place::Limit(name).refused(format!(" = {value}: give a number {range}")))
+        };
+        for (name, value) in [("speed", self.speed), ("acceleration", self.acceleration)] {
             if value.is_nan() || value <= 0.0 {
-                return Err(SafetyError::Limit { name, value, range: "above 0", default: "no limit" });
+                return refused(name, value, "above 0, or leave it out for no limit");
             }
         }
         for (name, value) in [("clearance", self.clearance), ("deviation", self.deviation)] {
             if !(value.is_finite() && value >= 0.0) {
-                return Err(SafetyError::Limit { name, value, range: "from 0 up", default: "0" });
+                return refused(name, value, "from 0 up, or leave it out for 0");
             }
         }
         Ok(())

@@ -11,7 +11,7 @@
 //!   that brake, lag behind their targets or are seen late, whose targets it would have to know.
 //! * **Obstacles and geofence** by the plane through the nearest point of every edge in reach
 //!   ([`Obstacles`]), and a shape cast along the way as a second opinion.
-//! * **Deadlock** by keeping to the right ([`Patience`]).
+//! * **Deadlock** by keeping to the right (`deadlock`).
 //!
 //! # Why it is safe
 //! Members `i` and `j` at distance `d`, unit vector `n` from `i` to `j`, `s = r_i + r_j + clearance`.
@@ -131,7 +131,6 @@ mod step;
 mod ways;
 
 pub(in crate::swarm) use cell::foot;
-pub use deadlock::Patience;
 pub use filter::{Filter, Flags, Seen, Stray};
 pub use limits::{Limits, Place, SafetyError};
 pub use obstacles::{Obstacle, Obstacles};

@@ -17,7 +17,7 @@ use super::cell::{HalfPlane, foot, length, nearest};
 use super::limits::{Place, SafetyError};
 use super::ways::edges;
 use crate::geometry::box_tree::BoxTree;
-use crate::geometry::point::{area, minus};
+use crate::geometry::point::{area, bounds, minus, plus};
 use crate::geometry::shape::{crossing, segments_cross};
 
 /// A solid \[m, world frame\].
@@ -36,11 +36,12 @@ pub enum Obstacle {
 
 impl Obstacle {
     /// The same solid farther along \[m\].
-    fn moved(&self, [x, y]: [f64; 2]) -> Self {
-        let place = |[px, py]: [f64; 2]| [px + x, py + y];
+    fn moved(&self, by: [f64; 2]) -> Self {
         match self {
-            Obstacle::Polygon(corners) => Obstacle::Polygon(corners.iter().copied().map(place).collect()),
-            Obstacle::Disc { centre, radius } => Obstacle::Disc { centre: place(*centre), radius: *radius },
+            Obstacle::Polygon(corners) => Obstacle::Polygon(corners.iter().map(|&at| plus(at, by)).collect()),
+            Obstacle::Disc { centre, radius } => {
+                Obstacle::Disc { centre: plus(*centre, by), radius: *radius }
+            }
         }
     }
 }
@@ -72,7 +73,6 @@ struct Outline {
     high: [f64; 2],
     /// The solid is all that lies outside: a fence.
     inverted: bool,
-    /// Corners run anticlockwise.
     anticlockwise: bool,
 }
 
@@ -81,6 +81,8 @@ const MOST_PAIRS: usize = 20_000_000;
 
 /// Largest coordinate accepted \[m\]: squares must not overflow.
 const LARGEST: f64 = 1e100;
+const NOT_FINITE: &str =
+    " has a number that is not finite or beyond 1e100 m: give finite coordinates in metres";
 
 impl Obstacles {
     /// # Errors
@@ -143,16 +145,10 @@ impl Obstacles {
         }
         let twice_area = check_polygon(&corners, place)?;
         let outline = self.outlines.len();
-        for (k, &a) in corners.iter().enumerate() {
-            let b = corners[(k + 1) % corners.len()];
+        for [a, b] in edges(&corners) {
             self.pieces.push(Piece::Edge { segment: Segment::new(vector(a), vector(b)), outline });
         }
-        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for corner in &corners {
-            for k in 0..2 {
-                (low[k], high[k]) = (low[k].min(corner[k]), high[k].max(corner[k]));
-            }
-        }
+        let (low, high) = bounds(corners);
         let anticlockwise = twice_area > 0.0;
         self.outlines.push(Outline { low, high, inverted, anticlockwise });
         self.within.push(false);
@@ -161,10 +157,10 @@ impl Obstacles {
 
     fn add_disc(&mut self, centre: [f64; 2], radius: f64, place: Place) -> Result<(), SafetyError> {
         if !centre.iter().chain([&radius]).all(|value| value.abs() <= LARGEST) {
-            return Err(SafetyError::NotFinite { place });
+            return Err(place.refused(NOT_FINITE));
         }
         if radius <= 0.0 {
-            return Err(SafetyError::Disc { place, radius });
+            return Err(place.refused(format!(" has radius {radius} m: give a positive number")));
         }
         self.pieces.push(Piece::Disc { centre: vector(centre), ball: Ball::new(radius) });
         Ok(())
@@ -366,9 +362,7 @@ impl Piece {
             Piece::Disc { centre, ball } => (*centre - here).length() - ball.radius,
         }
     }
-}
 
-impl Piece {
     /// The place in the hull with these corners, one or more, that is nearest to the piece.
     fn place_nearest(&self, hull: &[[f64; 2]]) -> Vector {
         let from_edge = |edge: [[f64; 2]; 2]| match self {
@@ -410,37 +404,38 @@ impl Outline {
 fn check_polygon(corners: &[[f64; 2]], place: Place) -> Result<f64, SafetyError> {
     let count = corners.len();
     if count < 3 {
-        return Err(SafetyError::Corners { place, count });
+        return Err(place.refused(format!(" has {count} corners: give at least 3")));
     }
     if !corners.iter().flatten().all(|value| value.abs() <= LARGEST) {
-        return Err(SafetyError::NotFinite { place });
+        return Err(place.refused(NOT_FINITE));
     }
-    let edge = |k: usize| (corners[k], corners[(k + 1) % count]);
-    let bounds = |k: usize| {
-        let (a, b) = edge(k);
-        ([0, 1].map(|axis| a[axis].min(b[axis])), [0, 1].map(|axis| a[axis].max(b[axis])))
-    };
-    let tree = BoxTree::new((0..count).map(bounds));
+    let edge = |k: usize| [corners[k], corners[(k + 1) % count]];
+    let tree = BoxTree::new((0..count).map(|k| bounds(edge(k))));
     let mut compared = 0;
     for first in 0..count {
-        let (low, high) = bounds(first);
+        let (low, high) = bounds(edge(first));
         // Neighbouring edges share a corner; they cannot cross, but they can lie on each other.
         let others = tree.overlapping(low, high).inspect(|_| compared += 1).filter(|&second| {
-            let ((a, b), (c, d)) = (edge(first), edge(second));
+            let ([a, b], [c, d]) = (edge(first), edge(second));
             second >= first + 2 && !(first == 0 && second == count - 1) && segments_cross(a, b, c, d)
         });
         if let Some(second) = others.min() {
-            return Err(SafetyError::Crossing { place, first, second });
+            return Err(place.refused(format!(
+                ": edges {first} and {second} (from 0) cross: give corners in order around the shape"
+            )));
         }
+        // To compare each with those beside it would take minutes.
         if compared > MOST_PAIRS {
-            return Err(SafetyError::TooDense { place, count });
+            return Err(place.refused(format!(
+                ": too many of its {count} edges run side by side to be checked for crossings: give fewer corners"
+            )));
         }
     }
     let twice_area = 2.0 * area(corners);
     let extent =
         corners.iter().flat_map(|&p| minus(p, corners[0])).fold(0.0, |most: f64, off| most.max(off.abs()));
     if twice_area.abs() <= 1e-12 * extent * extent {
-        return Err(SafetyError::NoArea { place });
+        return Err(place.refused(" has no area: give corners that do not lie on one line"));
     }
     Ok(twice_area)
 }

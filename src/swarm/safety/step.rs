@@ -5,7 +5,7 @@ use super::deadlock::Tick;
 use super::filter::{Filter, Flags, Seen, places};
 use super::ways::Border;
 use crate::flock::vectors::distance;
-use crate::geometry::point::{dot, minus};
+use crate::geometry::point::{dot, minus, plus};
 
 /// A member's wanted way at this tick, and its reach.
 #[derive(Clone, Copy)]
@@ -55,7 +55,7 @@ impl Filter {
         member: usize,
     ) -> ([f64; 2], Flags) {
         let here = seen.present.get(member);
-        let way = [wanted[0] - here[0], wanted[1] - here[1]];
+        let way = minus(wanted, here);
         if !seen.known[member] || !way.iter().all(|value| value.is_finite()) {
             self.detours[member].reset();
             self.cell.planes.clear();
@@ -65,7 +65,7 @@ impl Filter {
         let motion = self.motion(seen, period, member);
         let mut request = self.request(motion, way, period, self.ahead(seen, member));
         let origins = self.enclose(seen, &mut request, member);
-        let open = request.open(request.reach);
+        let open = shortened(way, request.reach);
         let mut flags = self.why(open, origins);
         if let Some(Motion { from, .. }) = motion.filter(|_| !brakes) {
             self.leave_room_to_brake(&mut request, from, period, &mut flags);
@@ -92,7 +92,7 @@ impl Filter {
             flags.0 |= Flags::SPEED_LIMITED;
         }
         // An unchanged way gives the wanted target to the last bit.
-        let target = if step == way { wanted } else { [here[0] + step[0], here[1] + step[1]] };
+        let target = if step == way { wanted } else { plus(here, step) };
         (target, flags)
     }
 
@@ -127,8 +127,7 @@ impl Filter {
             return Some(Motion { from: [0.0; 2], velocity });
         }
         let velocity = [0, 1].map(|k| (last[k] - before[k]) / period);
-        let from = [last[0] - here[0], last[1] - here[1]];
-        Some(Motion { from, velocity: shortened(velocity, self.limits.speed) })
+        Some(Motion { from: minus(last, here), velocity: shortened(velocity, self.limits.speed) })
     }
 
     /// The place at which a member stands as soon as it can \[m, world frame\]: where its targets are known not behind it, as the place
@@ -152,7 +151,7 @@ impl Filter {
             let velocity = shortened(velocity, most);
             velocity.map(|v| v * length(velocity) / (2.0 * self.limits.acceleration))
         });
-        [from[0] + way[0], from[1] + way[1]]
+        plus(from, way)
     }
 
     /// The member's velocity, where there is one and a limit that asks for it.
@@ -287,7 +286,7 @@ impl Filter {
         // Nearer to its goal than its own size, a member waits for the one that stands there; as near as solids let it come
         // to one that they hide, it has arrived.
         let is_hidden = || {
-            let nearest = self.nearest_to_stand([here[0] + way[0], here[1] + way[1]], member);
+            let nearest = self.nearest_to_stand(plus(here, way), member);
             nearest > 0.0 && distance <= nearest + ARRIVED * size
         };
         if distance <= size || distance == 0.0 || is_hidden() {
@@ -303,10 +302,10 @@ impl Filter {
         } else {
             direct
         };
-        let straight = self.cell.share(request.open(scale));
+        let straight = self.cell.share(shortened(way, scale));
         let direct = shortened(direct, scale);
         let tick = Tick { scale, wanted: way, distance, straight, direct, moved: goal };
-        detour.update(&self.limits.patience, &tick);
+        detour.update(self.limits.patience, &tick);
         goal
     }
 
@@ -335,7 +334,7 @@ impl Filter {
             (2.0 * room * period / (time + period)).min(room)
         };
         let end = self.cell.nearest(request.way, request.reach);
-        let brakable = length(from) + step(length([end[0] - from[0], end[1] - from[1]]));
+        let brakable = length(from) + step(length(minus(end, from)));
         for plane in self.cell.planes.iter_mut().filter(|plane| plane.offset > 0.0) {
             let gone = dot(plane.normal, from);
             // At the border or beyond it as it is, there is nothing to bring nearer.
@@ -383,19 +382,8 @@ impl Filter {
         {
             return step;
         }
-        let share = self.obstacles.free_way(here, [here[0] + step[0], here[1] + step[1]], disc);
+        let share = self.obstacles.free_way(here, plus(here, step), disc);
         [share * step[0], share * step[1]]
-    }
-}
-
-impl MotionRequest {
-    /// The straight way, or as much of it as is `most` \[m\] long.
-    fn open(&self, most: f64) -> [f64; 2] {
-        if self.distance <= most {
-            return self.way;
-        }
-        let share = most / self.distance;
-        [share * self.way[0], share * self.way[1]]
     }
 }
 
@@ -412,7 +400,7 @@ fn add_border(
     stray: f64,
     reach: f64,
 ) {
-    let way = [there[0] - here[0], there[1] - here[1]];
+    let way = minus(there, here);
     let distance = length(way);
     let normal = if distance > 0.0 { [way[0] / distance, way[1] / distance] } else { aside };
     let fresh = (distance - keep) / 2.0;

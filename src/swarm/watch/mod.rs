@@ -88,7 +88,6 @@ struct Member {
     /// Where it was last known to be \[m\]: by a pose that was believed or by ranges. It outlasts the pose, since the member
     /// has not left the world.
     place: Option<[f64; 2]>,
-    /// Whether ranges have contradicted a pose and confirmed none since.
     is_doubted: bool,
     /// Newest pose of a run that is consistent in itself and not yet believed, and how many are in it.
     candidate: Option<(Pose, u32)>,

@@ -212,12 +212,8 @@ mod tests {
     ) -> Vec<Result<(), Rejection>> {
         for observer in 0..5 {
             for of in (0..5).filter(|&of| of != observer) {
-                assert!(
-                    watch.receive_range(
-                        Range { observer, of, distance: measure(observer, of), stamp: now },
-                        now
-                    )
-                );
+                let range = Range { observer, of, distance: measure(observer, of), stamp: now };
+                assert!(watch.receive_range(range, now));
             }
         }
         watch.look(now);
@@ -226,6 +222,18 @@ mod tests {
 
     fn true_distance(observer: usize, of: usize) -> f64 {
         distance(PLACES[observer], PLACES[of])
+    }
+
+    /// Those in the corners send their poses, after some of them have measured member 4 where it truly is.
+    fn corners(watch: &mut Watch, now: f64, observers: &[usize]) {
+        for &observer in observers {
+            let range = Range { observer, of: 4, distance: true_distance(observer, 4), stamp: now };
+            assert!(watch.receive_range(range, now));
+        }
+        watch.look(now);
+        for (m, &place) in PLACES[..4].iter().enumerate() {
+            watch.receive(m, pose(place, now), now).expect("no one measures it");
+        }
     }
 
     #[test]
@@ -297,9 +305,7 @@ mod tests {
     #[test]
     fn a_place_believed_before_anyone_had_measured_gives_way_to_the_measured_one() {
         let mut watch = watch();
-        for (m, &place) in PLACES[..4].iter().enumerate() {
-            watch.receive(m, pose(place, 0.0), 0.0).expect("a first pose");
-        }
+        corners(&mut watch, 0.0, &[]);
         watch.receive(4, pose([9.0, 9.0], 0.0), 0.0).expect("nothing was measured yet");
         assert_eq!(watch.position(4), Some([9.0, 9.0]));
         let verdicts = period(&mut watch, 0.1, [9.0, 9.0], true_distance);
@@ -316,14 +322,7 @@ mod tests {
     fn one_found_lying_is_not_believed_where_nobody_measures_it_and_stays_where_it_was() {
         let mut watch = watch();
         let send = |watch: &mut Watch, now: f64, claims: [f64; 2], observers: &[usize]| {
-            for &observer in observers {
-                let range = Range { observer, of: 4, distance: true_distance(observer, 4), stamp: now };
-                assert!(watch.receive_range(range, now));
-            }
-            watch.look(now);
-            for (m, &place) in PLACES[..4].iter().enumerate() {
-                watch.receive(m, pose(place, now), now).expect("no one measures it");
-            }
+            corners(watch, now, observers);
             watch.receive(4, pose(claims, now), now)
         };
         // Farther off than it can go while ranges are remembered.
@@ -336,6 +335,8 @@ mod tests {
         // What it says now may be true by what was measured before, and is not confirmed by it.
         let ahead = send(&mut watch, 0.5, [2.2, 2.0], &[]);
         assert!(matches!(ahead, Err(Rejection::Unconfirmed { measured: 0 })), "{ahead:?}");
+        let known =
+            |watch: &Watch| (watch.health(4), watch.place(4).map(|at| at.map(|x| (1e9 * x).round() / 1e9)));
         let mut now = 0.5;
         let mut for_a_while = |watch: &mut Watch, claims, observers: &[usize]| {
             for k in 0..50 {
@@ -346,20 +347,13 @@ mod tests {
                 let is_unconfirmed = matches!(verdict, Err(Rejection::Unconfirmed { .. }));
                 assert!(is_unconfirmed || is_remembered, "{now}: {verdict:?}");
             }
-            assert_eq!(
-                (watch.health(4), watch.place(4).map(|at| at.map(|x| (1e9 * x).round() / 1e9))),
-                (Health::Stopped, Some(PLACES[4]))
-            );
+            assert_eq!(known(watch), (Health::Stopped, Some(PLACES[4])));
         };
         for_a_while(&mut watch, lie, &[]);
         // One range confirms no place, a true one no more than a false one.
         for_a_while(&mut watch, PLACES[4], &[0]);
         watch.look(-1.0);
-        assert_eq!(
-            (watch.health(4), watch.place(4).map(|at| at.map(|x| (1e9 * x).round() / 1e9))),
-            (Health::Waiting, Some(PLACES[4])),
-            "the clock is set back"
-        );
+        assert_eq!(known(&watch), (Health::Waiting, Some(PLACES[4])), "the clock is set back");
         assert!(matches!(send(&mut watch, -1.0, lie, &[]), Err(Rejection::Unconfirmed { measured: 0 })));
         assert_eq!(send(&mut watch, -0.9, PLACES[4], &[0, 1, 2, 3]), Ok(()), "there is no other place");
         assert_eq!(send(&mut watch, -0.8, PLACES[4], &[]), Ok(()), "and it is one like others again");
@@ -371,14 +365,7 @@ mod tests {
         let mut verdicts = Vec::new();
         for step in 0..40 {
             let now = 0.05 * f64::from(step);
-            for observer in 0..4 {
-                let range = Range { observer, of: 4, distance: true_distance(observer, 4), stamp: now };
-                assert!(watch.receive_range(range, now));
-            }
-            watch.look(now);
-            for (m, &place) in PLACES[..4].iter().enumerate() {
-                watch.receive(m, pose(place, now), now).expect("no one measures it");
-            }
+            corners(&mut watch, now, &[0, 1, 2, 3]);
             // At the speed of 1 m/s that poses are allowed it may have come 0.9 m in the 0.9 s since.
             verdicts.push(watch.receive(4, pose([2.7, 2.0], now - 0.9), now));
         }

@@ -5,7 +5,8 @@ use crate::messages::lifecycle_msgs as msgs;
 use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Service};
 
 /// A node's lifecycle and the services `~/change_state`, `~/get_state`, `~/get_available_states`,
-/// `~/get_available_transitions`, `~/get_transition_graph`, with the topic `~/transition_event`.
+/// `~/get_available_transitions`, `~/get_transition_graph`, with the topic `~/transition_event`. By default it has none of them.
+#[derive(Default)]
 pub struct Lifecycle {
     machine: Machine,
     /// None where peers have no part in it.

@@ -10,46 +10,31 @@ use crate::messages::said;
 /// A validator: `Err` with the reason refuses a value.
 pub type Check = Box<dyn Fn(&str, &Value) -> Result<(), String> + Send>;
 
-/// Values that a number may take, both ends included; the step of 0 allows all between.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Range {
-    Integer(IntegerRange),
-    Double(FloatingPointRange),
-}
-
 /// A parameter as the node declares it.
 pub struct Declaration {
-    pub(super) name: String,
+    /// As peers receive it.
+    pub(super) descriptor: ParameterDescriptor,
     pub(super) value: Value,
-    description: String,
-    constraints: String,
-    range: Option<Range>,
-    pub(super) read_only: bool,
     checks: Vec<Check>,
 }
 
 impl Declaration {
     /// A parameter with its default value, which fixes its type.
     pub fn new(name: &str, default: impl Into<Value>) -> Self {
-        Self {
-            name: name.into(),
-            value: default.into(),
-            description: String::new(),
-            constraints: String::new(),
-            range: None,
-            read_only: false,
-            checks: Vec::new(),
-        }
+        let value = default.into();
+        let descriptor =
+            ParameterDescriptor { name: name.into(), kind: value.kind(), ..ParameterDescriptor::default() };
+        Self { descriptor, value, checks: Vec::new() }
     }
 
     pub fn name(&self) -> &str {
-        &self.name
+        &self.descriptor.name
     }
 
     /// Meaning and unit, for people.
     #[must_use]
     pub fn describe(mut self, description: &str) -> Self {
-        self.description = description.into();
+        self.descriptor.description = description.into();
         self
     }
 
@@ -57,7 +42,7 @@ impl Declaration {
     #[must_use]
     pub fn range(mut self, range: RangeInclusive<f64>) -> Self {
         let (from_value, to_value) = range.into_inner();
-        self.range = Some(Range::Double(FloatingPointRange { from_value, to_value, step: 0.0 }));
+        self.descriptor.floating_point_range = vec![FloatingPointRange { from_value, to_value, step: 0.0 }];
         self
     }
 
@@ -65,14 +50,14 @@ impl Declaration {
     #[must_use]
     pub fn integer_range(mut self, range: RangeInclusive<i64>) -> Self {
         let (from_value, to_value) = range.into_inner();
-        self.range = Some(Range::Integer(IntegerRange { from_value, to_value, step: 0 }));
+        self.descriptor.integer_range = vec![IntegerRange { from_value, to_value, step: 0 }];
         self
     }
 
     /// Set at the start and never again.
     #[must_use]
     pub fn read_only(mut self) -> Self {
-        self.read_only = true;
+        self.descriptor.read_only = true;
         self
     }
 
@@ -83,35 +68,16 @@ impl Declaration {
         constraints: &str,
         check: impl Fn(&str, &Value) -> Result<(), String> + Send + 'static,
     ) -> Self {
-        let before = if self.constraints.is_empty() { "" } else { "; " };
-        self.constraints += &format!("{before}{constraints}");
+        let known = &mut self.descriptor.additional_constraints;
+        let before = if known.is_empty() { "" } else { "; " };
+        *known += &format!("{before}{constraints}");
         self.checks.push(Box::new(check));
         self
     }
 
-    /// The descriptor that peers receive.
-    pub(super) fn descriptor(&self) -> ParameterDescriptor {
-        ParameterDescriptor {
-            name: self.name.clone(),
-            kind: self.value.kind(),
-            description: self.description.clone(),
-            additional_constraints: self.constraints.clone(),
-            read_only: self.read_only,
-            dynamic_typing: false,
-            floating_point_range: match self.range {
-                Some(Range::Double(range)) => vec![range],
-                _ => Vec::new(),
-            },
-            integer_range: match self.range {
-                Some(Range::Integer(range)) => vec![range],
-                _ => Vec::new(),
-            },
-        }
-    }
-
     /// The value as it would be stored.
     pub(super) fn admit(&self, value: Value) -> Result<Value, Refusal> {
-        let name = || self.name.clone();
+        let name = || self.name().to_owned();
         let value = value.widened(&self.value);
         if value.kind() != self.value.kind() {
             let (expected, found) = (self.value.kind_name(), value.kind_name());
@@ -120,17 +86,14 @@ impl Declaration {
         if matches!(&value, Value::Double(number) if number.is_nan()) {
             return Err(Refusal::NotANumber { name: name() });
         }
-        match (self.range, &value) {
-            (Some(Range::Double(FloatingPointRange { from_value, to_value, .. })), Value::Double(number)) => {
-                self.within(from_value, to_value, *number)?;
-            }
-            (Some(Range::Integer(IntegerRange { from_value, to_value, .. })), Value::Integer(number)) => {
-                self.within(from_value, to_value, *number)?;
-            }
+        let ParameterDescriptor { floating_point_range, integer_range, .. } = &self.descriptor;
+        match (&floating_point_range[..], &integer_range[..], &value) {
+            ([range], _, Value::Double(number)) => self.within(range.from_value, range.to_value, *number)?,
+            (_, [range], Value::Integer(number)) => self.within(range.from_value, range.to_value, *number)?,
             _ => {}
         }
         for check in &self.checks {
-            check(&self.name, &value).map_err(|reason| Refusal::Vetoed { name: name(), reason })?;
+            check(self.name(), &value).map_err(|reason| Refusal::Vetoed { name: name(), reason })?;
         }
         Ok(value)
     }
@@ -140,7 +103,7 @@ impl Declaration {
             return Ok(());
         }
         let (value, allowed) = (format!("{value:?}"), format!("{from:?} to {to:?}"));
-        Err(Refusal::Range { name: self.name.clone(), value, allowed })
+        Err(Refusal::Range { name: self.name().to_owned(), value, allowed })
     }
 }
 

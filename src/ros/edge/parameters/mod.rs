@@ -5,7 +5,7 @@ mod served;
 mod store;
 mod value;
 
-pub use declaration::{Check, Declaration, Range, Refusal};
+pub use declaration::{Check, Declaration, Refusal};
 pub use served::Parameters;
 pub use store::{Change, Store};
 pub use value::Value;

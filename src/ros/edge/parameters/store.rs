@@ -28,13 +28,14 @@ impl Store {
     /// # Errors
     /// A name declared twice, or a start value that is refused.
     pub fn declare(&mut self, mut declaration: Declaration, start: Option<Value>) -> Result<(), Refusal> {
-        if self.declared.contains_key(&declaration.name) {
-            return Err(Refusal::Declared { name: declaration.name });
+        let name = declaration.name().to_owned();
+        if self.declared.contains_key(&name) {
+            return Err(Refusal::Declared { name });
         }
         if let Some(start) = start {
             declaration.value = declaration.admit(start)?;
         }
-        self.declared.insert(declaration.name.clone(), declaration);
+        self.declared.insert(name, declaration);
         Ok(())
     }
 
@@ -80,13 +81,13 @@ impl Store {
         let value = value.map(|value| value.widened(&declaration.value));
         match value {
             Ok(value) if value == declaration.value => Ok(value),
-            _ if declaration.read_only => Err(Refusal::ReadOnly { name: name.into() }),
+            _ if declaration.descriptor.read_only => Err(Refusal::ReadOnly { name: name.into() }),
             value => declaration.admit(value?),
         }
     }
 
     fn apply(&mut self, name: &str, value: Value) {
-        if let Some(declaration) = self.declared.get_mut(name).filter(|declaration| !declaration.read_only) {
+        if let Some(declaration) = self.declared.get_mut(name).filter(|one| !one.descriptor.read_only) {
             declaration.value = value.clone();
             self.changes.push(Change { name: name.into(), value });
         }
@@ -99,10 +100,8 @@ impl Store {
 
     /// The descriptor of a parameter; of type 0 if it is not declared.
     pub fn descriptor(&self, name: &str) -> ParameterDescriptor {
-        self.declared.get(name).map_or_else(
-            || ParameterDescriptor { name: name.into(), ..Default::default() },
-            Declaration::descriptor,
-        )
+        let undeclared = || ParameterDescriptor { name: name.into(), ..Default::default() };
+        self.declared.get(name).map_or_else(undeclared, |declaration| declaration.descriptor.clone())
     }
 
     /// Names below any of the prefixes (none: all), at most `depth` dots deep (0: any), and the groups

@@ -81,7 +81,6 @@ fn short_faults(raw: &RawSwarm) -> Option<String> {
     ))
 }
 
-/// A fault that another of the same robot hides.
 fn hidden_fault(raw: &RawSwarm) -> Option<String> {
     let faults = &raw.flight.faults;
     let until = |k: usize| faults[k].until.unwrap_or(f64::INFINITY);
@@ -98,7 +97,6 @@ fn hidden_fault(raw: &RawSwarm) -> Option<String> {
     ))
 }
 
-/// Commands for periods that are not flown.
 fn late_commands(flight: &Flight, raw: &RawSwarm) -> Option<String> {
     let periods = flight.periods();
     let late = raw.flight.commands.iter().enumerate().filter(|(_, command)| command.after > periods);
@@ -106,7 +104,6 @@ fn late_commands(flight: &Flight, raw: &RawSwarm) -> Option<String> {
     beyond(&format!("the end of the flight, after {periods} periods"), keys, "flight.duration")
 }
 
-/// Robots that no leader reaches by links that last.
 fn unled(formation: &Formation) -> Option<String> {
     let unled = formation.unled();
     if unled.len() == formation.count() {
@@ -142,7 +139,6 @@ fn near_at_the_start(flight: &Flight, raw: &RawSwarm) -> Option<String> {
     ))
 }
 
-/// Robots that begin where no pose is believed.
 fn out_of_range_at_the_start(flight: &Flight, raw: &RawSwarm) -> Option<String> {
     let (control, robots) = (flight.control(), flight.fleet().robots());
     let names = control.formation().named(|m| !control.is_believed(robots[m].position))?;
@@ -167,7 +163,6 @@ fn led_outside(flight: &Flight) -> Option<String> {
     ))
 }
 
-/// Leaders whose programs go to where no pose is believed.
 fn led_out_of_range(flight: &Flight, raw: &RawSwarm) -> Option<String> {
     let (control, formation) = (flight.control(), flight.control().formation());
     let programs_end = formation.programs_end();
@@ -196,7 +191,6 @@ fn in_solids(flight: &Flight) -> Option<String> {
     Some(format!("an obstacle stands at the places of {names} in the formation; move one of them"))
 }
 
-/// Leaders whose programs end in an obstacle.
 fn led_into_solids(flight: &Flight) -> Option<String> {
     let (obstacles, formation) = (flight.control().filter().obstacles(), flight.control().formation());
     let end = Some(formation.programs_end()).filter(|end| end.is_finite() && *end > 0.0)?;
@@ -208,7 +202,6 @@ fn led_into_solids(flight: &Flight) -> Option<String> {
     ))
 }
 
-/// Commands that lead robots to where they cannot stand.
 fn commanded_astray<'a>(raw: &'a RawSwarm, flight: &'a Flight) -> impl Iterator<Item = String> + 'a {
     let (filter, formation) = (flight.control().filter(), flight.control().formation());
     raw.flight.commands.iter().enumerate().filter_map(move |(k, command)| {
@@ -252,7 +245,6 @@ fn fast_paths(swarm: &Swarm, formation: &Formation) -> impl Iterator<Item = Stri
     })
 }
 
-/// Programs that leap from one point to the next.
 fn leaping_paths(swarm: &Swarm, formation: &Formation) -> impl Iterator<Item = String> {
     let reach = swarm.raw.limits.speed.unwrap_or(f64::INFINITY) * swarm.raw.control.period;
     (0..swarm.leaders.len()).filter_map(move |k| {

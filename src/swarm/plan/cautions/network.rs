@@ -4,6 +4,7 @@ use super::super::{DEVIATIONS_KEPT, largest_noise};
 use crate::flock::vectors::distance;
 use crate::scene::swarm::raw::{RawCommandKind, RawFaultKind, RawSwarm};
 use crate::scene::text::decimals;
+use crate::swarm::channel::ChannelParams;
 use crate::swarm::flight::Flight;
 use crate::swarm::formation::Formation;
 use crate::swarm::safety::Limits;
@@ -12,25 +13,16 @@ use crate::swarm::safety::Limits;
 struct Network {
     /// Key of the file that has it.
     key: String,
-    /// \[m\]
-    noise: f64,
-    /// \[period\]
-    delay: u32,
-    /// \[period\]
-    jitter: u32,
-    /// \[1\]
-    loss: f64,
+    params: ChannelParams,
 }
 
-/// Those of a flight, in order.
 fn networks(raw: &RawSwarm) -> Vec<Network> {
-    let flight = &raw.flight;
-    let jitter = flight.jitter;
-    let first =
-        Network { key: "flight".into(), noise: flight.noise, delay: flight.delay, jitter, loss: flight.loss };
-    let commanded = flight.commands.iter().enumerate().filter_map(|(k, command)| match command.what {
+    let begun = ChannelParams::of(&raw.flight);
+    let first = Network { key: "flight".into(), params: begun };
+    let commanded = raw.flight.commands.iter().enumerate().filter_map(|(k, command)| match command.what {
         RawCommandKind::Channel { noise, delay, loss } => {
-            Some(Network { key: format!("flight.commands[{k}].what"), noise, delay, jitter, loss })
+            let params = ChannelParams { noise, delay, loss, ..begun };
+            Some(Network { key: format!("flight.commands[{k}].what"), params })
         }
         _ => None,
     });
@@ -51,7 +43,7 @@ pub fn of(raw: &RawSwarm, flight: &Flight) -> Vec<String> {
 impl Network {
     fn noise(&self, raw: &RawSwarm, formation: &Formation) -> Option<String> {
         let largest = largest_noise(formation, raw.limits.clearance)?;
-        (self.noise > largest).then(|| {
+        (self.params.noise > largest).then(|| {
             format!(
                 "the noise takes up the space between robots at their places: the filter will hold some of them; lower \
                  {}.noise or limits.clearance, or space the robots out",
@@ -61,7 +53,7 @@ impl Network {
     }
 
     fn delay(&self, raw: &RawSwarm) -> Option<String> {
-        let Self { key, delay, jitter, .. } = self;
+        let Self { key, params: ChannelParams { delay, jitter, .. } } = self;
         let is_too_old = |periods: u32| f64::from(periods) * raw.control.period > raw.poses.age_limit;
         if is_too_old(*delay) {
             return Some(format!(
@@ -80,14 +72,14 @@ impl Network {
 
     fn loss(&self) -> Option<String> {
         let key = &self.key;
-        (self.loss >= 1.0)
+        (self.params.loss >= 1.0)
             .then(|| format!("every pose is lost: no robot will get a target; lower {key}.loss"))
     }
 
     /// Ranges that contradict honest poses: their own noise along the way, and that of both poses.
     fn ranges(&self, raw: &RawSwarm) -> Option<String> {
         let ranges = raw.ranges.as_ref()?;
-        let off = DEVIATIONS_KEPT * (ranges.noise.powi(2) + 2.0 * self.noise.powi(2)).sqrt();
+        let off = DEVIATIONS_KEPT * (ranges.noise.powi(2) + 2.0 * self.params.noise.powi(2)).sqrt();
         (off > ranges.tolerance).then(|| {
             format!(
                 "ranges.noise and {}.noise together, at three deviations {} m, are above ranges.tolerance: honest \
@@ -131,7 +123,6 @@ fn silent(raw: &RawSwarm, flight: &Flight) -> Option<String> {
     ))
 }
 
-/// Leaders of which no pose is ever believed.
 fn never_heard(raw: &RawSwarm, flight: &Flight) -> Option<String> {
     use RawFaultKind::{Dead, NotANumber, Silent, WrongFrame};
     let formation = flight.control().formation();
