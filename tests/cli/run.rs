@@ -373,10 +373,10 @@ fn rules_that_contradict_themselves_are_refused() {
 fn feedback_that_leaves_no_place_of_rest_is_named() {
     let roles = "roles=[{region={kind='edge',side='left'},role='clamped'},{region={kind='edge',side='right'},\
                  role='leader',motion={kind='velocity',per_step=[0.1,0]}}]";
-    for factor in ["-1", "0.8", "-2.5"] {
+    for (factor, why) in [("-1", "no follower ever moves"), ("0.8", "stretches"), ("-2.5", "stretches")] {
         let factor = format!("rule.feedback={{factor={factor}}}");
         let keys = [roles, &factor, "frame=none", "record={}", "equilibrium={}"];
-        refused_with("tension", &keys, &["rule.feedback.factor", "stretches", "between -1 and 0"]);
+        refused_with("tension", &keys, &["rule.feedback.factor", why, "between -1 and 0"]);
     }
 }
 
@@ -508,7 +508,10 @@ fn cuts_that_miss_the_body_are_warned_of_by_the_plan_and_the_run() {
         let said = done(&[command, &set].concat(), folder.path());
         assert!(said.contains("caution: no bond crosses cuts[1], which is without effect"), "{said}");
         assert!(said.contains(of_action), "{said}");
-        assert!(!said.contains("cuts[0]") && !said.contains("actions[0]"), "{said}");
+        let cautions = said.lines().filter(|line| line.starts_with("caution"));
+        let others: Vec<_> =
+            cautions.filter(|line| line.contains("cuts[0]") || line.contains("actions[0]")).collect();
+        assert!(others.is_empty(), "{others:?}");
     }
 }
 

@@ -99,7 +99,7 @@ fn check(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
     ];
     if raw.rule.feedback.as_ref().is_some_and(|feedback| feedback.factor == -1.0) {
         let message = "takes back all that the mean asks for: no follower ever moves, and there is nothing to solve for";
-        let help = "give a factor above -1, or leave [equilibrium] out to step";
+        let help = "give a factor between -1 and 0, or leave [equilibrium] out to step";
         return Err(refuse("rule.feedback.factor", message.into(), help));
     }
     match clash.into_iter().find_map(|(key, what)| key.map(|key| (key, what))) {
