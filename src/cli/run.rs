@@ -33,7 +33,7 @@ use flockform::solve::interrupt::Interrupt;
 use flockform::study::compare::run::plan;
 use flockform::study::trade::{Chosen, choose};
 use observer::RunObserver;
-use recorder::{Recorder, Records};
+use recorder::{Finished, Recorder};
 use words::{closing_words, where_to_look};
 
 use super::checkpoint::{CheckpointArguments, Checkpointer, ResumedRun, resume_words};
@@ -242,7 +242,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     };
     begin.begin(common)?;
     if let (Some(probes), Some(left)) = (&mut plan.setup.probes, &left) {
-        *probes = left.checkpoint.probes.to_vec();
+        *probes = left.checkpoint.records.probes.clone();
     }
     let from = left.map(|left| left.checkpoint).map(|Checkpoint { engine, residual, .. }| (engine, residual));
     let outcome = run_to_equilibrium_shared(&scene, plan, from, team, &mut observer);
@@ -274,19 +274,16 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
         }
     }
     let on_the_way = recorder.writing;
-    let records = recorder.finish(&outcome);
+    let finished = recorder.finish(&outcome);
     // What one rank cannot write ends all.
-    let is_lost = engine.any_of_parts(records.is_err());
-    let records = records?;
+    let is_lost = engine.any_of_parts(finished.is_err());
+    let Finished { records, stage, animation, writing } = finished?;
     if is_lost {
         return Err(RanksError::SaidElsewhere.into());
     }
     memory::return_what_is_free();
-    let Records { snapshots, drawn, probes, load_steps, stage, animation, writing } = records;
     let timings = Timings { setup, steps: elapsed.saturating_sub(on_the_way), output: writing };
-    let (snapshots, drawn) = (&snapshots[..], &drawn[..]);
-    let (probes, load_steps) = (&probes[..], &load_steps[..]);
-    let results = Results { scene: &scene, outcome: &outcome, snapshots, drawn, probes, load_steps, timings };
+    let results = Results { scene: &scene, outcome: &outcome, records: &records, timings };
     let progress = Progress::of_drawing(quiet, "figure");
     let is_cut_short = AtomicBool::new(false);
     let show = |done: usize, of: usize| {
