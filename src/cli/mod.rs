@@ -323,7 +323,7 @@ impl Refusal {
         };
         match self {
             Refusal::Export(ExportError::Io { source, .. } | ExportError::Unmakeable { source, .. })
-            | Refusal::Film(FilmError::Io { source, .. })
+            | Refusal::Film(FilmError::File(ExportError::Io { source, .. }))
             | Refusal::Record(RecordError::Io { source, .. })
             | Refusal::Install(install::InstallError::Write { error: source, .. })
             | Refusal::NewFile { source, .. } => is_full(source),

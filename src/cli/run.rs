@@ -19,7 +19,7 @@ use flockform::continuum::run::{SharedError, StopReason, require_shareable};
 use flockform::continuum::shares::bytes_each;
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
 use flockform::export::figures::is_raster;
-use flockform::export::film;
+use flockform::export::film::{self, FilmColour};
 use flockform::export::memory::Outputs;
 use flockform::export::report;
 use flockform::export::{Drawing, Results, Signed, Timings, write_all};
@@ -37,7 +37,7 @@ use recorder::{Finished, Recorder};
 use words::{closing_words, where_to_look};
 
 use super::checkpoint::{CheckpointArguments, Checkpointer, ResumedRun, resume_words};
-use super::film::{BodyFilmArguments, Finish};
+use super::film::{FilmArguments, Finish};
 use super::names::{FileName, Overrides, SceneArguments, in_full};
 use super::output::{FigureArguments, OutputArguments, ReportArguments, command_line};
 use super::progress::Progress;
@@ -60,7 +60,7 @@ pub struct RunArguments {
     #[command(flatten)]
     figures: FigureArguments,
     #[command(flatten)]
-    film: BodyFilmArguments,
+    film: FilmArguments,
     #[command(flatten)]
     checkpoints: CheckpointArguments,
     #[command(flatten)]
@@ -202,7 +202,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     let required = |colour| film::run::require_colour(&scene, colour);
     let force = arguments.output.force;
     let film = match &folder {
-        Some(folder) => arguments.film.open(folder, force, required)?,
+        Some(folder) => arguments.film.open(folder, force, FilmColour::Displacement, required)?,
         None => None,
     };
     let setup = start.elapsed();
