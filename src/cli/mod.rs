@@ -214,18 +214,6 @@ pub enum Refusal {
     #[error("{0}")]
     Ros(#[from] RosArgumentError),
     #[error(
-        "--ros-args: this command is no ROS 2 node\n  help: leave them out, or use `flockform node` or `flockform robots` without --transport shm"
-    )]
-    NoNode,
-    #[error(
-        "--node-per-robot: robots are no ROS 2 nodes over shared memory\n  help: leave it out, or leave out --transport shm"
-    )]
-    NoNodes,
-    #[error(
-        "--live: over shared memory a node serves no page\n  help: leave it out, or leave out --transport shm"
-    )]
-    NoPage,
-    #[error(
         "`{then}` is called `{now}` now\n  help: `flockform --help` lists every command, and `--help` after one its options"
     )]
     Renamed { then: &'static str, now: &'static str },
@@ -246,19 +234,8 @@ pub enum Refusal {
     Sweep(#[from] export::sweep::SweepError),
     #[error("{0}")]
     Checkpoint(#[from] export::checkpoint::CheckpointError),
-    #[error(
-        "there is no {}bundled {kinds} `{name}`{}\n  help: {}see {} for all of them",
-        if *.takes_files { format!("{kinds} file and no ") } else { String::new() },
-        if *.takes_files { "" } else { ", and no file is taken here" },
-        .nearest.map_or_else(String::new, |(kind, nearest)| format!("the nearest bundled {kind} is `{nearest}`; ")),
-        .kinds.lists()
-    )]
-    NotBundled {
-        kinds: names::Kinds,
-        name: String,
-        takes_files: bool,
-        nearest: Option<(&'static str, &'static str)>,
-    },
+    #[error("{0}")]
+    NotBundled(String),
     #[error("`{name}` is a {kind}\n  help: `flockform {command} {name}`")]
     OtherKind { name: String, kind: &'static str, command: &'static str },
     #[error(
@@ -361,7 +338,11 @@ fn read_arguments() -> Result<(Arguments, RosArguments), Refusal> {
     match arguments.command {
         Command::Node(node::NodeArguments { transport: Transport::Ros2, .. })
         | Command::Robots(node::RobotsArguments { transport: Transport::Ros2, .. }) => Ok((arguments, ros?)),
-        _ if is_asked => Err(Refusal::NoNode),
+        _ if is_asked => {
+            let help =
+                "leave them out, or use `flockform node` or `flockform robots` without --transport shm";
+            Err(material::wrong("--ros-args", "this command is no ROS 2 node", help).into())
+        }
         _ => Ok((arguments, RosArguments::default())),
     }
 }
