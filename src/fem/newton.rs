@@ -6,7 +6,6 @@ use super::error::FemError;
 use super::problem::Problem;
 use super::solution::Solution;
 use super::solve::solve_tangent;
-use super::strain::Strain;
 
 /// Steps of Newton's method for a part of the way, at most.
 const MOST_STEPS: usize = 25;
@@ -74,8 +73,7 @@ struct Way<'a> {
 impl Way<'_> {
     fn solution(&self, u: Vec<f64>) -> Result<Solution, FemError> {
         let (ux, uy) = u.chunks(2).map(|u| (u[0], u[1])).unzip();
-        let found = Solution::from_displacements(self.problem.mesh.clone(), self.problem.material, ux, uy);
-        Ok(found?.with_inclusions(self.problem.inclusions.clone()).with_strain(Strain::Stretch))
+        Solution::of(self.problem, ux, uy)
     }
 
     /// What is prescribed after a part of the way.

@@ -293,7 +293,7 @@ impl<'a> ShapeProblem<'a> {
             last.map_or(0, |k| k as u32 + 1)
         };
         let materials = self.inclusions.iter().map(|(_, material)| *material).collect();
-        Inclusions::new(materials, (0..mesh.cell_count()).map(of_cell).collect())
+        Inclusions { materials, of_cell: (0..mesh.cell_count()).map(of_cell).collect() }
     }
 
     /// Whether the middle of a stretch of a piece lies in one of the portions.

@@ -53,8 +53,7 @@ pub(crate) fn solve_near(
     let nodes = 0..problem.mesh.node_count();
     let ux = nodes.clone().map(|i| component(2 * i)).collect();
     let uy = nodes.map(|i| component(2 * i + 1)).collect();
-    let solution = Solution::from_displacements(problem.mesh.clone(), problem.material, ux, uy)?;
-    Ok(solution.with_inclusions(problem.inclusions.clone()))
+    Solution::of(problem, ux, uy)
 }
 
 /// A part (cells joined through nodes) is held if x and y are prescribed somewhere in it, and if no point
