@@ -89,8 +89,9 @@ impl Curves {
         }
         for inner in outer..self.curves.len() {
             let piece = &self.curves[inner].piece;
-            cuts[inner][0].1 = self.of_line_end(outer, inner, piece.from, piece.tangent(0.0));
-            cuts[inner][1].1 = self.of_line_end(outer, inner, piece.to, piece.tangent(1.0).map(|v| -v));
+            for (end, (at, inward)) in piece.leaving().into_iter().enumerate() {
+                cuts[inner][end].1 = self.of_line_end(outer, inner, at, inward);
+            }
             for other in (0..self.curves.len()).filter(|&other| other < outer || other > inner) {
                 for [t, s] in crossings(piece, &self.curves[other].piece, near) {
                     let grading = if other < outer { LINE_END } else { 0.0 };
@@ -107,9 +108,8 @@ impl Curves {
     fn of_line_end(&self, outer: usize, line: usize, end: Point, inward: Point) -> f64 {
         let near = MERGED * self.size;
         let goes_on = |other: &Curve| {
-            let piece = &other.piece;
-            let ends = [(piece.from, piece.tangent(0.0)), (piece.to, piece.tangent(1.0).map(|v| -v))];
-            ends.iter().any(|(at, to)| distance(*at, end) <= near && dot(*to, inward) < -0.9)
+            let ends = other.piece.leaving();
+            ends.into_iter().any(|(at, to)| distance(at, end) <= near && dot(to, inward) < -0.9)
         };
         let others = self.curves[outer..].iter().enumerate().filter(|&(k, _)| outer + k != line);
         let own = &self.curves[line].piece;

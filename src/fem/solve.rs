@@ -10,7 +10,7 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
-use super::assemble::{System, assemble};
+use super::assemble::{System, assemble, nodal_loads};
 use super::error::FemError;
 use super::mesh::Mesh;
 use super::newton::{Held, solve_turning};
@@ -44,7 +44,7 @@ pub(crate) fn solve_near(
     if problem.strain == Strain::Stretch {
         return solve_turning(problem, start, led);
     }
-    let system = assemble(problem, prescribed);
+    let system = assemble(problem, prescribed, &nodal_loads(problem), None);
     let unknowns = if system.load.is_empty() { Vec::new() } else { solve_reduced(&system, &problem.mesh)? };
     let component = |c: usize| match system.unknown[c] {
         Some(i) => unknowns[i],
