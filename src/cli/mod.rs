@@ -229,8 +229,6 @@ pub enum Refusal {
     #[error("{0}")]
     Design(#[from] flockform::study::design::DesignError),
     #[error("{0}")]
-    Output(#[from] export::sweep::OutputError),
-    #[error("{0}")]
     Sweep(#[from] export::sweep::SweepError),
     #[error("{0}")]
     Checkpoint(#[from] export::checkpoint::CheckpointError),

@@ -11,7 +11,7 @@ use flockform::continuum::equilibrium::run_to_equilibrium_watched;
 use flockform::continuum::run::StopReason;
 use flockform::engine::Engine;
 use flockform::engine::observer::Observer;
-use flockform::export::sweep::{Journal, Output, OutputError, Probed, Row, Values};
+use flockform::export::sweep::{Journal, Output, Probed, Row, SweepError, Values};
 use flockform::export::{ExportError, Measured, Summary, Timings};
 use flockform::scene::{Scene, SceneError};
 use flockform::solve::interrupt::Interrupt;
@@ -50,7 +50,7 @@ pub struct Runs<'a> {
 /// A run that has ended, and its outputs.
 struct Ended {
     stop_reason: StopReason,
-    outputs: Vec<Result<String, OutputError>>,
+    outputs: Vec<Result<String, SweepError>>,
     cautions: Vec<String>,
 }
 
@@ -61,7 +61,7 @@ impl Ended {
     }
 
     /// The first output that such a run does not have.
-    fn misspelt(&self) -> Option<&OutputError> {
+    fn misspelt(&self) -> Option<&SweepError> {
         self.outputs.iter().find_map(|output| output.as_ref().err()).filter(|_| self.is_sound())
     }
 }
@@ -186,7 +186,7 @@ impl Runs<'_> {
             Ok(Ended { stop_reason: StopReason::Interrupted, .. }) => None,
             Ok(Ended { stop_reason, outputs, mut cautions }) => {
                 let missing =
-                    outputs.iter().filter_map(|output| output.as_ref().err()).map(OutputError::to_string);
+                    outputs.iter().filter_map(|output| output.as_ref().err()).map(SweepError::to_string);
                 cautions.extend(missing.map(|error| error.lines().next().unwrap_or_default().to_owned()));
                 let outputs = outputs.into_iter().map(Result::unwrap_or_default).collect();
                 row(stop_reason.name(), outputs, stop_reason.fault().unwrap_or_default(), cautions)
