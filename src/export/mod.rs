@@ -101,7 +101,7 @@ use figures::{Formats, Subject};
 pub use folder::{OutputFolder, out_of, unfinished};
 pub use manifest::write_new;
 pub use summary::{
-    BrokenBonds, Counts, Energies, Equilibrium, FirstBreak, Measured, Seconds, Signed, Summary, Timings,
+    BrokenBonds, Counts, Energies, Equilibrium, FirstBreak, Measured, Signed, Summary, Timings,
 };
 pub use vtk::{VtkSeries, write_piece};
 

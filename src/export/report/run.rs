@@ -187,7 +187,7 @@ fn facts(scene: &Scene, outcome: &Outcome, summary: &Summary) -> Vec<(String, St
         });
         fact("Broken bonds", format!("{}{first}", broken.count));
     }
-    fact("Time", format!("{:.3} s for the steps", summary.timings.steps_s));
+    fact("Time", format!("{:.3} s for the steps", summary.timings.steps.as_secs_f64()));
     facts
 }
 
