@@ -16,7 +16,7 @@ mod completions;
 mod film;
 mod gallery;
 mod install;
-mod interrupt;
+pub mod interrupt;
 mod live;
 pub mod log;
 mod log_writer;
@@ -357,11 +357,6 @@ pub fn spare_memory(command: &Command) {
     if matches!(command, Command::Run(_) | Command::Plan(_)) {
         memory::return_what_is_dropped();
     }
-}
-
-/// From now on an interrupt ends the program within a second.
-pub fn watch_interrupts() {
-    interrupt::watch();
 }
 
 /// Says why nothing was done, and gives the exit code; what an interrupt has broken off is no bad input.

@@ -154,7 +154,7 @@ impl Prepared {
 }
 
 /// The scene with an equilibrium whose solve an interrupt ends.
-fn interruptible(mut scene: Scene) -> Scene {
+pub fn interruptible(mut scene: Scene) -> Scene {
     if let Some(equilibrium) = &mut scene.equilibrium {
         equilibrium.request.interrupt = Interrupt::new(interrupt::flag());
     }

@@ -14,13 +14,13 @@ use flockform::engine::observer::Observer;
 use flockform::export::sweep::{Journal, Output, Probed, Row, SweepError, Values};
 use flockform::export::{ExportError, Measured, Summary, Timings};
 use flockform::scene::{Scene, SceneError};
-use flockform::solve::interrupt::Interrupt;
 use flockform::study::compare::run::plan;
 use flockform::study::design::Design;
-use flockform::study::trade::{Chosen, choose};
+use flockform::study::trade::choose;
 
 use super::super::names::SceneArguments;
 use super::super::progress::Progress;
+use super::super::run::interruptible;
 use super::super::{Refusal, interrupt};
 
 /// How a run ended that could not begin.
@@ -160,10 +160,7 @@ impl Runs<'_> {
         let start = Instant::now();
         let overrides = self.design.overrides(run);
         let load = |more: &[String]| self.scene.load_scene(&[&overrides, more].concat());
-        let Chosen { mut scene, .. } = choose(load(&[])?, &load)?;
-        if let Some(equilibrium) = &mut scene.equilibrium {
-            equilibrium.request.interrupt = Interrupt::new(interrupt::flag());
-        }
+        let scene = interruptible(choose(load(&[])?, &load)?.scene);
         let plan = plan(&scene)?;
         let between = (UPDATES_BETWEEN_LOOKS / plan.count().max(1)).max(1);
         let mut observer = Look { outputs: self.outputs, probed: Probed::default(), between };
