@@ -12,7 +12,7 @@ fn main() -> ExitCode {
     let done = cli::arguments().and_then(|(arguments, ros)| {
         cli::spare_memory(&arguments.command);
         cli::log::start(&arguments, &ros);
-        cli::watch_interrupts();
+        cli::interrupt::watch();
         cli::dispatch(arguments.command, &ros)
     });
     done.unwrap_or_else(|refusal| cli::refuse(&refusal))

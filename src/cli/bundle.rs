@@ -4,7 +4,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use flockform::scene::{Bundled, SceneError};
+use flockform::scene::Bundled;
 use serde_json::{Value, json};
 
 use super::names::{FileName, Kind, bundled_file};
@@ -33,7 +33,8 @@ pub fn list(arguments: &ListArguments) -> Result<(), Refusal> {
         Listed::Swarms => Kind::Swarm,
     };
     let all = kind.bundled();
-    let titles: Vec<String> = all.iter().map(|one| title(kind, one)).collect::<Result<_, _>>()?;
+    let title = |one: &Bundled| kind.described(one).map(|[title, _]| title);
+    let titles: Vec<String> = all.iter().map(title).collect::<Result<_, _>>()?;
     if arguments.json {
         let entry = |(one, title): (&Bundled, &String)| json!({ "name": one.name, "title": title });
         let entries: Vec<Value> = all.iter().zip(&titles).map(entry).collect();
@@ -42,13 +43,6 @@ pub fn list(arguments: &ListArguments) -> Result<(), Refusal> {
     let width = all.iter().map(|one| one.name.len()).max().unwrap_or(0);
     let line = |(one, title): (&Bundled, &String)| format!("{:width$}  {title}\n", one.name);
     print(&all.iter().zip(&titles).map(line).collect::<String>())
-}
-
-fn title(kind: Kind, one: &Bundled) -> Result<String, SceneError> {
-    match kind {
-        Kind::Scene => Ok(one.load(&[])?.raw.title),
-        Kind::Swarm => Ok(one.load_swarm(&[])?.raw.title),
-    }
 }
 
 #[derive(Debug, Args)]
@@ -78,7 +72,8 @@ pub struct NewArguments {
 /// Writes a file to begin with, which is valid as it is; one that is there already stays.
 pub fn new(arguments: &NewArguments) -> Result<(), Refusal> {
     let NewArguments { kind, name, from } = arguments;
-    let (found, file) = bundled_file(from.as_deref().unwrap_or(first(*kind)))?;
+    let usual = if *kind == Kind::Scene { "tension" } else { "square" };
+    let (found, file) = bundled_file(from.as_deref().unwrap_or(usual))?;
     if found != *kind {
         return Err(Refusal::OtherKind {
             name: file.name.to_owned(),
@@ -89,14 +84,6 @@ pub fn new(arguments: &NewArguments) -> Result<(), Refusal> {
     let path = toml_path(*kind, name)?;
     write_new(&path, &(heading(*kind, &file, &path) + file.text))?;
     say(&format!("{} begins as `{}`: edit it, then `{}`\n", path.display(), file.name, command(*kind, &path)))
-}
-
-/// The bundled file that a new one of this kind begins as.
-fn first(kind: Kind) -> &'static str {
-    match kind {
-        Kind::Scene => "tension",
-        Kind::Swarm => "square",
-    }
 }
 
 /// The path of a new file: with the ending that the program reads, and no name that a bundled file hides.

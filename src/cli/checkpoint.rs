@@ -1,17 +1,17 @@
 //! Checkpoints of a stepped run: when one is due, and how a run is taken up again.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use clap::Args;
 use flockform::continuum::plan::Plan;
-use flockform::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use flockform::engine::Engine;
 use flockform::engine::state::EngineState;
 use flockform::export::checkpoint::{Checkpoint, CheckpointError, RunRequest};
 use flockform::export::report::RunRecorder;
-use flockform::export::{Drawn, ExportError, OutputFolder, VtkSeries, out_of, unfinished};
+use flockform::export::{ExportError, OutputFolder, Records, VtkSeries, out_of, unfinished};
 use flockform::scene::Scene;
 
 use super::interrupt;
@@ -125,7 +125,8 @@ impl ResumedRun {
 
     /// Steps whose configurations are to be drawn and were not kept, as no figures were asked for then.
     pub fn undrawn(&self, scene: &Scene) -> Vec<usize> {
-        let Checkpoint { engine, snapshots, drawn, .. } = &self.checkpoint;
+        let Checkpoint { engine, records, .. } = &self.checkpoint;
+        let Records { snapshots, drawn, .. } = &**records;
         let kept = || snapshots.iter().map(|one| one.step).chain(drawn.iter().map(|one| one.step));
         let is_missing = |figure: &usize| *figure <= engine.step() && kept().all(|one| one != *figure);
         scene.record.figures.iter().copied().filter(is_missing).collect()
@@ -145,16 +146,13 @@ impl ResumedRun {
 
     /// The error for an engine that does not fit the checkpoint.
     pub fn foreign(folder: &OutputFolder, what: &dyn std::error::Error) -> CheckpointError {
-        CheckpointError::Foreign { path: folder.folder().to_owned(), what: what.to_string() }
+        CheckpointError::foreign(folder.folder().to_owned(), &what.to_string())
     }
 }
 
-/// The records so far.
+/// The records so far, with those of the report and the frames.
 pub struct Recorded<'a> {
-    pub snapshots: &'a [Snapshot],
-    pub drawn: &'a [Drawn],
-    pub probes: &'a [ProbeSeries],
-    pub load_steps: &'a [LoadStep],
+    pub records: &'a Records,
     pub animation: Option<&'a RunRecorder>,
     pub frames: Option<&'a mut VtkSeries>,
 }
@@ -303,11 +301,10 @@ impl<'a> Checkpointer<'a> {
     ) -> Result<(), ExportError> {
         let of = (&self.asked, self.scene, self.digest);
         let animation = kept.animation.map(RunRecorder::animation_state);
-        // All ranks have the same rows; a run is gone on with by those of the first.
-        let load_steps = if folder.is_some() { kept.load_steps } else { &[] };
-        let recorded = (kept.snapshots, kept.drawn, kept.probes, load_steps, animation);
+        // A run is gone on with by the records of the first rank.
+        let records = if folder.is_some() { Cow::Borrowed(kept.records) } else { Cow::default() };
         let state = (EngineState::of(engine), residual);
-        let checkpoint = Checkpoint::new(of, state, recorded, self.stepping());
+        let checkpoint = Checkpoint::new(of, state, (records, animation), self.stepping());
         if let Some(team) = engine.parted() {
             let first = engine.body().index_from(engine.body().owned().start);
             return checkpoint.write_in_parts(folder, (first, team), synced);

@@ -13,9 +13,9 @@ use super::output::{OutputArguments, ReportArguments};
 use super::progress::Progress;
 use super::{Refusal, interrupt, print, say};
 
-/// A film of a body.
+/// A film of a body; of a swarm with [`of_swarms`].
 #[derive(Debug, Args)]
-pub struct BodyFilmArguments {
+pub struct FilmArguments {
     /// Make a film of it as FILE.gif, FILE.mp4 or FILE.webm; the last two take the program ffmpeg
     #[arg(long, value_name = "FILE", value_parser = film_path())]
     film: Option<PathBuf>,
@@ -24,15 +24,11 @@ pub struct BodyFilmArguments {
     film_colour: Option<FilmColour>,
 }
 
-/// A film of a swarm.
-#[derive(Debug, Args)]
-pub struct SwarmFilmArguments {
-    /// Make a film of it as FILE.gif, FILE.mp4 or FILE.webm; the last two take the program ffmpeg
-    #[arg(long, value_name = "FILE", value_parser = film_path())]
-    film: Option<PathBuf>,
-    /// Quantity that colours the film's robots [default: role]
-    #[arg(long, value_name = "QUANTITY", value_parser = one_of(FilmColour::OF_SWARMS), requires = "film")]
-    film_colour: Option<FilmColour>,
+/// Makes the argument `film_colour` that of a swarm.
+pub fn of_swarms(colour: clap::Arg) -> clap::Arg {
+    colour
+        .help("Quantity that colours the film's robots [default: role]")
+        .value_parser(one_of(FilmColour::OF_SWARMS))
 }
 
 /// Reads the name of one of these colours.
@@ -52,43 +48,32 @@ pub struct AskedFilm {
     pub colour: FilmColour,
 }
 
-impl BodyFilmArguments {
+impl FilmArguments {
     /// Whether a film is asked for.
     pub fn is_asked(&self) -> bool {
         self.film.is_some()
     }
 
-    /// The film, if one is asked for, in a colour that the body has, beside these results.
+    /// The film, if one is asked for, in the colour asked for or the `usual` one, beside these results.
     pub fn open(
         &self,
         results: &OutputFolder,
         force: bool,
+        usual: FilmColour,
         require: impl FnOnce(FilmColour) -> Result<(), FilmError>,
     ) -> Result<Option<AskedFilm>, Refusal> {
         let Some(path) = &self.film else { return Ok(None) };
-        let colour = self.film_colour.unwrap_or(FilmColour::Displacement);
+        let colour = self.film_colour.unwrap_or(usual);
         require(colour)?;
-        AskedFilm::open(path, results, force, colour).map(Some)
-    }
-}
-
-impl SwarmFilmArguments {
-    /// The film, if one is asked for, beside these results.
-    pub fn open(&self, results: &OutputFolder, force: bool) -> Result<Option<AskedFilm>, Refusal> {
-        let colour = self.film_colour.unwrap_or(FilmColour::Role);
-        self.film.as_ref().map(|path| AskedFilm::open(path, results, force, colour)).transpose()
+        results.require_outside(path)?;
+        // It stands beside its place until it is made, and an interrupt removes it.
+        let file = FilmFile::create(path, force)?;
+        interrupt::removes([file.part().to_owned()]);
+        Ok(Some(AskedFilm { file, colour }))
     }
 }
 
 impl AskedFilm {
-    /// Its file stands beside its place until it is made, and an interrupt removes it.
-    fn open(path: &Path, results: &OutputFolder, force: bool, colour: FilmColour) -> Result<Self, Refusal> {
-        results.require_outside(path)?;
-        let file = FilmFile::create(path, force)?;
-        interrupt::removes([file.part().to_owned()]);
-        Ok(Self { file, colour })
-    }
-
     /// Makes the film once the results stand in `kept`; `None` if an interrupt ended it.
     fn make(self, film: &Film<'_>, kept: &Path, quiet: bool) -> Result<Option<Finished>, FilmError> {
         interrupt::removes([self.file.part().to_owned()]);

@@ -56,16 +56,14 @@ fn exhibits(names: &[String]) -> Result<Vec<Exhibit>, Refusal> {
         return Err(not_bundled(&Kind::ALL, name));
     }
     let is_asked = |one: &&Bundled| names.is_empty() || names.iter().any(|name| name == one.name);
-    let scene = |one: &Bundled| -> Result<Exhibit, SceneError> {
-        let raw = one.load(&[])?.raw;
-        Ok(Exhibit::new("scenes", one.name, &raw.title, &raw.notes))
-    };
-    let swarm = |one: &Bundled| -> Result<Exhibit, SceneError> {
-        let raw = one.load_swarm(&[])?.raw;
-        Ok(Exhibit::new("swarms", one.name, &raw.title, &raw.notes))
-    };
-    let scenes = bundled::SCENES.iter().filter(is_asked).map(scene);
-    Ok(scenes.chain(bundled::SWARMS.iter().filter(is_asked).map(swarm)).collect::<Result<_, _>>()?)
+    let exhibits =
+        [(Kind::Scene, "scenes"), (Kind::Swarm, "swarms")].into_iter().flat_map(|(kind, folder)| {
+            kind.bundled().iter().filter(is_asked).map(move |one| -> Result<Exhibit, SceneError> {
+                let [title, notes] = kind.described(one)?;
+                Ok(Exhibit::new(folder, one.name, &title, &notes))
+            })
+        });
+    Ok(exhibits.collect::<Result<_, _>>()?)
 }
 
 /// A run that fails by design (a body that grows without bound) has a report too; one without is no exhibit.

@@ -2,6 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, Write};
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Component, Path, PathBuf};
 use std::process::ExitCode;
 
@@ -225,7 +226,8 @@ impl Staged {
         let _ = fs::remove_file(&self.beside);
         interrupt::removes([self.beside.clone()]);
         File::create_new(&self.beside)?.write_all(&file.bytes)?;
-        set_mode(&self.beside, if file.executable { 0o755 } else { 0o644 })
+        let mode = if file.executable { 0o755 } else { 0o644 };
+        fs::set_permissions(&self.beside, fs::Permissions::from_mode(mode))
     }
 
     fn move_into_place(self) -> Result<(), InstallError> {
@@ -242,15 +244,4 @@ impl Drop for Staged {
         // Fails where the file was moved, which is what it is for.
         let _ = fs::remove_file(&self.beside);
     }
-}
-
-#[cfg(unix)]
-fn set_mode(path: &Path, mode: u32) -> io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    fs::set_permissions(path, fs::Permissions::from_mode(mode))
-}
-
-#[cfg(not(unix))]
-fn set_mode(_path: &Path, _mode: u32) -> io::Result<()> {
-    Ok(())
 }

@@ -3,6 +3,7 @@
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::ops::ControlFlow;
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -171,12 +172,9 @@ impl LiveArguments {
 fn open(address: &str) -> Option<PathBuf> {
     let door = std::env::temp_dir().join(format!("flockform-live-{}.html", std::process::id()));
     let _ = std::fs::remove_file(&door);
-    let mut options = OpenOptions::new();
-    options.write(true).create_new(true);
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    let file = OpenOptions::new().write(true).create_new(true).mode(0o600).open(&door);
     let page = format!("<!doctype html><meta http-equiv=\"refresh\" content=\"0;url={address}\">\n");
-    let written = options.open(&door).and_then(|mut file| file.write_all(page.as_bytes()));
+    let written = file.and_then(|mut file| file.write_all(page.as_bytes()));
     if let Err(error) = written.and_then(|()| output::open(&door)) {
         note!("cannot open a browser: {error}; open the address by hand");
     }

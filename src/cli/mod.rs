@@ -16,7 +16,7 @@ mod completions;
 mod film;
 mod gallery;
 mod install;
-mod interrupt;
+pub mod interrupt;
 mod live;
 pub mod log;
 mod log_writer;
@@ -214,18 +214,6 @@ pub enum Refusal {
     #[error("{0}")]
     Ros(#[from] RosArgumentError),
     #[error(
-        "--ros-args: this command is no ROS 2 node\n  help: leave them out, or use `flockform node` or `flockform robots` without --transport shm"
-    )]
-    NoNode,
-    #[error(
-        "--node-per-robot: robots are no ROS 2 nodes over shared memory\n  help: leave it out, or leave out --transport shm"
-    )]
-    NoNodes,
-    #[error(
-        "--live: over shared memory a node serves no page\n  help: leave it out, or leave out --transport shm"
-    )]
-    NoPage,
-    #[error(
         "`{then}` is called `{now}` now\n  help: `flockform --help` lists every command, and `--help` after one its options"
     )]
     Renamed { then: &'static str, now: &'static str },
@@ -241,24 +229,11 @@ pub enum Refusal {
     #[error("{0}")]
     Design(#[from] flockform::study::design::DesignError),
     #[error("{0}")]
-    Output(#[from] export::sweep::OutputError),
-    #[error("{0}")]
     Sweep(#[from] export::sweep::SweepError),
     #[error("{0}")]
     Checkpoint(#[from] export::checkpoint::CheckpointError),
-    #[error(
-        "there is no {}bundled {kinds} `{name}`{}\n  help: {}see {} for all of them",
-        if *.takes_files { format!("{kinds} file and no ") } else { String::new() },
-        if *.takes_files { "" } else { ", and no file is taken here" },
-        .nearest.map_or_else(String::new, |(kind, nearest)| format!("the nearest bundled {kind} is `{nearest}`; ")),
-        .kinds.lists()
-    )]
-    NotBundled {
-        kinds: names::Kinds,
-        name: String,
-        takes_files: bool,
-        nearest: Option<(&'static str, &'static str)>,
-    },
+    #[error("{0}")]
+    NotBundled(String),
     #[error("`{name}` is a {kind}\n  help: `flockform {command} {name}`")]
     OtherKind { name: String, kind: &'static str, command: &'static str },
     #[error(
@@ -323,7 +298,7 @@ impl Refusal {
         };
         match self {
             Refusal::Export(ExportError::Io { source, .. } | ExportError::Unmakeable { source, .. })
-            | Refusal::Film(FilmError::Io { source, .. })
+            | Refusal::Film(FilmError::File(ExportError::Io { source, .. }))
             | Refusal::Record(RecordError::Io { source, .. })
             | Refusal::Install(install::InstallError::Write { error: source, .. })
             | Refusal::NewFile { source, .. } => is_full(source),
@@ -361,7 +336,11 @@ fn read_arguments() -> Result<(Arguments, RosArguments), Refusal> {
     match arguments.command {
         Command::Node(node::NodeArguments { transport: Transport::Ros2, .. })
         | Command::Robots(node::RobotsArguments { transport: Transport::Ros2, .. }) => Ok((arguments, ros?)),
-        _ if is_asked => Err(Refusal::NoNode),
+        _ if is_asked => {
+            let help =
+                "leave them out, or use `flockform node` or `flockform robots` without --transport shm";
+            Err(material::wrong("--ros-args", "this command is no ROS 2 node", help).into())
+        }
         _ => Ok((arguments, RosArguments::default())),
     }
 }
@@ -378,11 +357,6 @@ pub fn spare_memory(command: &Command) {
     if matches!(command, Command::Run(_) | Command::Plan(_)) {
         memory::return_what_is_dropped();
     }
-}
-
-/// From now on an interrupt ends the program within a second.
-pub fn watch_interrupts() {
-    interrupt::watch();
 }
 
 /// Says why nothing was done, and gives the exit code; what an interrupt has broken off is no bad input.

@@ -46,10 +46,11 @@ impl Kind {
         }
     }
 
-    fn other(self) -> Self {
+    /// Title and notes of a bundled file of this kind.
+    pub fn described(self, one: &Bundled) -> Result<[String; 2], SceneError> {
         match self {
-            Kind::Scene => Kind::Swarm,
-            Kind::Swarm => Kind::Scene,
+            Kind::Scene => one.load(&[]).map(|scene| [scene.raw.title, scene.raw.notes]),
+            Kind::Swarm => one.load_swarm(&[]).map(|swarm| [swarm.raw.title, swarm.raw.notes]),
         }
     }
 
@@ -92,9 +93,8 @@ impl Kind {
 
     /// The error that names the kind of a file that is of the other one.
     pub fn refuse_other(self, word: &str) -> Option<Refusal> {
-        let other = self.other();
-        let (kind, command) = (other.name(), other.command());
-        (Kind::of(word) == Some(other)).then(|| Refusal::OtherKind { name: from_here(word), kind, command })
+        let other = Kind::of(word).filter(|&kind| kind != self)?;
+        Some(Refusal::OtherKind { name: from_here(word), kind: other.name(), command: other.command() })
     }
 
     /// A word as a path; one that is no file is taken for a misspelt name of a bundled file.
@@ -136,27 +136,16 @@ fn refusal_of(kinds: &[Kind], word: &str, takes_files: bool) -> Refusal {
     let nearest = renamed(word, &all).or_else(|| nearest(word, &all));
     let kind = |name: &str| kinds.iter().find(|kind| named(**kind).contains(&name));
     let nearest = nearest.and_then(|name| Some((kind(name)?.name(), name)));
-    Refusal::NotBundled { kinds: Kinds(kinds.to_vec()), name: word.to_owned(), takes_files, nearest }
-}
-
-/// Kinds in words: `scene or swarm`.
-#[derive(Clone, Debug)]
-pub struct Kinds(Vec<Kind>);
-
-impl Kinds {
-    /// The commands that list the bundled files of these kinds.
-    pub fn lists(&self) -> String {
-        let lists: Vec<String> =
-            self.0.iter().map(|kind| format!("`flockform list {}s`", kind.name())).collect();
-        lists.join(" and ")
-    }
-}
-
-impl std::fmt::Display for Kinds {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let names: Vec<&str> = self.0.iter().map(|kind| kind.name()).collect();
-        f.write_str(&names.join(" or "))
-    }
+    let nearest =
+        nearest.map_or_else(String::new, |(kind, name)| format!("the nearest bundled {kind} is `{name}`; "));
+    let lists: Vec<_> = kinds.iter().map(|kind| format!("`flockform list {}s`", kind.name())).collect();
+    let (kinds, lists) = (kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>(), lists.join(" and "));
+    let kinds = kinds.join(" or ");
+    let fault = match takes_files {
+        true => format!("there is no {kinds} file and no bundled {kinds} `{word}`"),
+        false => format!("there is no bundled {kinds} `{word}`, and no file is taken here"),
+    };
+    Refusal::NotBundled(format!("{fault}\n  help: {nearest}see {lists} for all of them"))
 }
 
 /// A word on the command line that names a bundled file or is a path; shells complete the names.

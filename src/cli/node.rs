@@ -22,6 +22,7 @@ use flockform::swarm::control::scope::NodeScopeError;
 use serde::{Deserialize, Serialize};
 
 use super::live::{self, PageArguments};
+use super::material::wrong;
 use super::output::own_command_line;
 use super::recording::{RecordArguments, close};
 use super::supervise::{Life, supervise};
@@ -161,7 +162,8 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
         None => {
             arguments.record.require_none("--transport shm")?;
             if arguments.live {
-                return Err(Refusal::NoPage);
+                let message = "over shared memory a node serves no page";
+                return Err(wrong("--live", message, "leave it out, or leave out --transport shm").into());
             }
             let domain = Domain::from_environment()?;
             let mut node =
@@ -325,7 +327,12 @@ pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCod
                 robots.run_while(interrupted, &mut |robots| life.send(false, || robots.kept())),
             ));
         }
-        None if arguments.node_per_robot => return Err(Refusal::NoNodes),
+        None if arguments.node_per_robot => {
+            let message = "robots are no ROS 2 nodes over shared memory";
+            return Err(
+                wrong("--node-per-robot", message, "leave it out, or leave out --transport shm").into()
+            );
+        }
         None => {
             let mut robots = SimulatedRobots::open(&swarm, &Domain::from_environment()?)?;
             announce(robots.fleet().robots().len());

@@ -50,23 +50,8 @@ impl ReportArguments {
 
 /// Opens a file with the program that this computer opens such files with.
 pub fn open(file: &Path) -> std::io::Result<()> {
-    opener(file).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().map(drop)
-}
-
-/// The command by which the platform opens a file, a page in the browser.
-fn opener(file: &Path) -> Command {
-    let mut command = match std::env::consts::OS {
-        "macos" => Command::new("open"),
-        "windows" => {
-            let mut command = Command::new("cmd");
-            // The first word in quotes would be a title.
-            command.args(["/C", "start", ""]);
-            command
-        }
-        _ => Command::new("xdg-open"),
-    };
-    command.arg(file);
-    command
+    let mut opener = Command::new(if cfg!(target_os = "macos") { "open" } else { "xdg-open" });
+    opener.arg(file).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().map(drop)
 }
 
 /// Which figures there shall be.

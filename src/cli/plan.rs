@@ -13,9 +13,9 @@ use flockform::study::compare::run::plan as plan_of;
 use flockform::swarm::plan::SwarmPlan;
 use serde_json::{Value, json};
 
+use super::material::wrong;
 use super::memory::{of_part, predicted, require};
 use super::names::{FileName, Kind, Overrides, SceneArguments};
-use super::ranks::RanksError;
 use super::swarm::SwarmFileArguments;
 use super::{Refusal, print, say};
 
@@ -38,7 +38,10 @@ pub struct PlanArguments {
 pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
     let PlanArguments { file, overrides: Overrides { set }, ranks, json } = arguments;
     let (words, value) = match Kind::of_either(file)? {
-        Kind::Swarm if ranks.is_some() => return Err(RanksError::Swarm.into()),
+        Kind::Swarm if ranks.is_some() => {
+            let message = "ranks share the run of a scene; a swarm is parted by `flockform node --member`";
+            return Err(wrong("--ranks", message, "leave it out").into());
+        }
         Kind::Swarm => {
             let swarm = SwarmFileArguments::new(file, set).load()?;
             let plan = SwarmPlan::new(&swarm)?;
@@ -63,7 +66,7 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
                 let words = of_parts.iter().flatten().map(|(name, value)| format!("{name}: {value}\n"));
                 let words = format!("{}\n{}", scene.raw.title, words.collect::<String>());
                 note!("the whole is not planned here: {too_large}");
-                return if *json { Ok(print(&format!("{value:#}\n"))?) } else { Ok(say(&words)?) };
+                return show(*json, &words, &value);
             }
             let plan = plan_of(&scene)?;
             // Before the report, which takes what a run does not.
@@ -92,11 +95,11 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
             (report.to_string(), scene_json(&scene.name, &plan, &report, memory))
         }
     };
-    match json {
-        true => print(&format!("{value:#}\n"))?,
-        false => say(&words)?,
-    }
-    Ok(())
+    show(*json, &words, &value)
+}
+
+fn show(json: bool, words: &str, value: &Value) -> Result<(), Refusal> {
+    if json { print(&format!("{value:#}\n")) } else { say(words) }
 }
 
 fn scene_json(name: &str, plan: &Plan, report: &PlanReport, [all, tables]: [usize; 2]) -> Value {

@@ -38,10 +38,6 @@ pub enum RanksError {
     OtherRun { rank: usize },
     #[error("{refusal}\n  (on rank {rank})")]
     OnRank { rank: usize, refusal: Box<Refusal> },
-    #[error(
-        "--ranks: ranks share the run of a scene; a swarm is parted by `flockform node --member`\n  help: leave it out"
-    )]
-    Swarm,
     /// Another rank says why.
     #[error("another rank refuses")]
     SaidElsewhere,

@@ -19,7 +19,7 @@ use flockform::continuum::run::{SharedError, StopReason, require_shareable};
 use flockform::continuum::shares::bytes_each;
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
 use flockform::export::figures::is_raster;
-use flockform::export::film;
+use flockform::export::film::{self, FilmColour};
 use flockform::export::memory::Outputs;
 use flockform::export::report;
 use flockform::export::{Drawing, Results, Signed, Timings, write_all};
@@ -33,11 +33,11 @@ use flockform::solve::interrupt::Interrupt;
 use flockform::study::compare::run::plan;
 use flockform::study::trade::{Chosen, choose};
 use observer::RunObserver;
-use recorder::{Recorder, Records};
+use recorder::{Finished, Recorder};
 use words::{closing_words, where_to_look};
 
 use super::checkpoint::{CheckpointArguments, Checkpointer, ResumedRun, resume_words};
-use super::film::{BodyFilmArguments, Finish};
+use super::film::{FilmArguments, Finish};
 use super::names::{FileName, Overrides, SceneArguments, in_full};
 use super::output::{FigureArguments, OutputArguments, ReportArguments, command_line};
 use super::progress::Progress;
@@ -60,7 +60,7 @@ pub struct RunArguments {
     #[command(flatten)]
     figures: FigureArguments,
     #[command(flatten)]
-    film: BodyFilmArguments,
+    film: FilmArguments,
     #[command(flatten)]
     checkpoints: CheckpointArguments,
     #[command(flatten)]
@@ -154,7 +154,7 @@ impl Prepared {
 }
 
 /// The scene with an equilibrium whose solve an interrupt ends.
-fn interruptible(mut scene: Scene) -> Scene {
+pub fn interruptible(mut scene: Scene) -> Scene {
     if let Some(equilibrium) = &mut scene.equilibrium {
         equilibrium.request.interrupt = Interrupt::new(interrupt::flag());
     }
@@ -202,7 +202,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     let required = |colour| film::run::require_colour(&scene, colour);
     let force = arguments.output.force;
     let film = match &folder {
-        Some(folder) => arguments.film.open(folder, force, required)?,
+        Some(folder) => arguments.film.open(folder, force, FilmColour::Displacement, required)?,
         None => None,
     };
     let setup = start.elapsed();
@@ -242,7 +242,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     };
     begin.begin(common)?;
     if let (Some(probes), Some(left)) = (&mut plan.setup.probes, &left) {
-        *probes = left.checkpoint.probes.to_vec();
+        *probes = left.checkpoint.records.probes.clone();
     }
     let from = left.map(|left| left.checkpoint).map(|Checkpoint { engine, residual, .. }| (engine, residual));
     let outcome = run_to_equilibrium_shared(&scene, plan, from, team, &mut observer);
@@ -274,19 +274,16 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
         }
     }
     let on_the_way = recorder.writing;
-    let records = recorder.finish(&outcome);
+    let finished = recorder.finish(&outcome);
     // What one rank cannot write ends all.
-    let is_lost = engine.any_of_parts(records.is_err());
-    let records = records?;
+    let is_lost = engine.any_of_parts(finished.is_err());
+    let Finished { records, stage, animation, writing } = finished?;
     if is_lost {
         return Err(RanksError::SaidElsewhere.into());
     }
     memory::return_what_is_free();
-    let Records { snapshots, drawn, probes, load_steps, stage, animation, writing } = records;
     let timings = Timings { setup, steps: elapsed.saturating_sub(on_the_way), output: writing };
-    let (snapshots, drawn) = (&snapshots[..], &drawn[..]);
-    let (probes, load_steps) = (&probes[..], &load_steps[..]);
-    let results = Results { scene: &scene, outcome: &outcome, snapshots, drawn, probes, load_steps, timings };
+    let results = Results { scene: &scene, outcome: &outcome, records: &records, timings };
     let progress = Progress::of_drawing(quiet, "figure");
     let is_cut_short = AtomicBool::new(false);
     let show = |done: usize, of: usize| {

@@ -8,7 +8,7 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use clap::Args;
-use flockform::export::film;
+use flockform::export::film::{self, FilmColour};
 use flockform::export::flight::{write_flight, write_flight_tables};
 use flockform::export::report::page::number;
 use flockform::export::report::{self, FlightRecorder};
@@ -21,7 +21,7 @@ use flockform::swarm::control::Control;
 use flockform::swarm::flight::{Flight, FlightReport, Record, Sample, fly_with_observer};
 use flockform::swarm::plan::cautions;
 
-use super::film::{Finish, SwarmFilmArguments};
+use super::film::{FilmArguments, Finish, of_swarms};
 use super::names::{FileName, Kind, Overrides, folder_in_full};
 use super::output::{OutputArguments, ReportArguments};
 use super::recording::{RecordArguments, close};
@@ -90,6 +90,7 @@ impl SwarmFileArguments {
 }
 
 #[derive(Debug, Args)]
+#[command(mut_arg("film_colour", of_swarms))]
 pub struct SwarmArguments {
     #[command(flatten)]
     swarm: SwarmFileArguments,
@@ -98,7 +99,7 @@ pub struct SwarmArguments {
     #[command(flatten)]
     report: ReportArguments,
     #[command(flatten)]
-    film: SwarmFilmArguments,
+    film: FilmArguments,
     #[command(flatten)]
     record: RecordArguments,
     /// Print the report as JSON
@@ -114,7 +115,7 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
         cautions::of(&swarm, &flight).iter().for_each(|caution| note!("caution: {}", on_terminal(caution)));
     }
     let (folder, force) = (arguments.output.folder(&swarm.name)?, arguments.output.force);
-    let film = arguments.film.open(&folder, force)?;
+    let film = arguments.film.open(&folder, force, FilmColour::Role, |_| Ok(()))?;
     let about = arguments.swarm.about("swarm", &swarm);
     let recording = arguments.record.open_beside(&folder, &about, force)?;
     let reports = !arguments.report.no_report;

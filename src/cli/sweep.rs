@@ -340,8 +340,7 @@ fn merge(arguments: &SweepArguments, start: Instant) -> Result<ExitCode, Refusal
     let Some((one, others)) = parts.split_first() else { return Ok(ExitCode::SUCCESS) };
     let whole = one.begun.whole();
     if let Some(other) = others.iter().find(|other| other.begun.whole() != whole) {
-        let (one, other) = (one.folder.clone(), other.folder.clone());
-        return Err(SweepError::Apart { one, other }.into());
+        return Err(SweepError::apart(&one.folder, &other.folder).into());
     }
     let rows = parts.iter().flat_map(|part| part.rows.clone()).collect();
     let mut request = whole.request;

@@ -30,13 +30,13 @@ use serde_json::Value;
 
 use self::difference::first_difference;
 pub use self::error::CheckpointError;
-use super::Drawn;
+use self::error::RESTORE;
+use super::Records;
 use super::error::ExportError;
 use super::manifest::create;
 use super::parts::write_each;
 use super::report::AnimationState;
 use crate::continuum::digest::fnv1a;
-use crate::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use crate::engine::setup::Setup;
 use crate::engine::state::EngineState;
 use crate::ranks::Team;
@@ -65,14 +65,8 @@ pub struct Checkpoint<'a> {
     pub engine: EngineState<'a>,
     /// Largest one-step motion over the spacing, at the last step; infinite before the first.
     pub residual: f64,
-    /// Configurations that are to be drawn at the end.
-    pub snapshots: Cow<'a, [Snapshot]>,
-    /// Figures that are drawn already.
-    pub drawn: Cow<'a, [Drawn]>,
-    /// Histories of the probed particles so far.
-    pub probes: Cow<'a, [ProbeSeries]>,
-    /// The response to the load so far, where it changes.
-    pub load_steps: Cow<'a, [LoadStep]>,
+    /// The records so far.
+    pub records: Cow<'a, Records>,
     /// State of the report, where there is to be one.
     pub animation: Option<AnimationState<'a>>,
     /// Time taken for the steps so far.
@@ -96,10 +90,6 @@ struct OtherPart {
     first: usize,
     count: usize,
 }
-
-/// The records of a run so far.
-type Recorded<'a> =
-    (&'a [Snapshot], &'a [Drawn], &'a [ProbeSeries], &'a [LoadStep], Option<AnimationState<'a>>);
 
 /// The command line of the run, which `--resume` does not repeat.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -125,7 +115,7 @@ impl<'a> Checkpoint<'a> {
     pub fn new(
         (asked, scene, digest): (&RunRequest, &Scene, u64),
         (engine, residual): (EngineState<'a>, f64),
-        (snapshots, drawn, probes, load_steps, animation): Recorded<'a>,
+        (records, animation): (Cow<'a, Records>, Option<AnimationState<'a>>),
         stepping: Duration,
     ) -> Self {
         Self {
@@ -135,10 +125,7 @@ impl<'a> Checkpoint<'a> {
             digest,
             engine,
             residual,
-            snapshots: Cow::Borrowed(snapshots),
-            drawn: Cow::Borrowed(drawn),
-            probes: Cow::Borrowed(probes),
-            load_steps: Cow::Borrowed(load_steps),
+            records,
             animation,
             stepping,
             parts: Parts::default(),
@@ -191,7 +178,8 @@ impl<'a> Checkpoint<'a> {
         let write = || {
             self.write_to(create(&part)?)?.sync_all()?;
             fs::rename(&part, &path)?;
-            sync_folder(folder)
+            // A name outlives a power cut only when its folder is on the disk.
+            File::open(folder)?.sync_all()
         };
         write().map_err(|error| {
             // On a full disk half of one is in the way of what is to come.
@@ -231,7 +219,7 @@ impl<'a> Checkpoint<'a> {
     /// Refuses to go on with another scene, or with files of it that have changed.
     ///
     /// # Errors
-    /// [`CheckpointError::Foreign`] names the first key that differs.
+    /// The first key that differs.
     pub fn require_of(&self, folder: &Path, scene: &Scene, digest: u64) -> Result<(), CheckpointError> {
         let path = folder.join(FILE);
         let now = as_json(scene);
@@ -239,12 +227,11 @@ impl<'a> Checkpoint<'a> {
             let parsed = |text: &str| serde_json::from_str::<Value>(text).unwrap_or_default();
             let differs = first_difference(&parsed(&self.scene), &parsed(&now), String::new());
             let what = differs.unwrap_or_else(|| "it is written otherwise".to_owned());
-            return Err(CheckpointError::Foreign { path, what });
+            return Err(CheckpointError::foreign(path, &what));
         }
         if self.digest != digest {
-            let what =
-                "the keys are the same, but the body, or a file that the scene names, is not".to_owned();
-            return Err(CheckpointError::Foreign { path, what });
+            let what = "the keys are the same, but the body, or a file that the scene names, is not";
+            return Err(CheckpointError::foreign(path, what));
         }
         Ok(())
     }
@@ -286,39 +273,43 @@ impl Checkpoint<'static> {
                 .map_err(|source| CheckpointError::Unreadable { path: path.clone(), source })?;
             let piece = Self::of_bytes(&path, &bytes)?;
             if (piece.engine.step(), piece.engine.count()) != (self.engine.step(), count) {
-                let what = "it is of another step, or of other particles".to_owned();
-                return Err(CheckpointError::Corrupted { path, what });
+                return Err(CheckpointError::corrupted(path, "it is of another step, or of other particles"));
             }
             pieces.push((first, piece.engine));
         }
         let joined = EngineState::of_pieces(&pieces, setup);
-        self.engine = joined
-            .map_err(|error| CheckpointError::Foreign { path: folder.join(FILE), what: error.to_string() })?;
+        self.engine =
+            joined.map_err(|error| CheckpointError::foreign(folder.join(FILE), &error.to_string()))?;
         Ok(())
     }
 
     fn of_bytes(path: &Path, bytes: &[u8]) -> Result<Self, CheckpointError> {
-        let path = || path.to_owned();
+        let unfit = |what: String, help| CheckpointError::Unfit { path: path.to_owned(), what, help };
         let begins = bytes.len().min(MAGIC.len());
         if bytes[..begins] != MAGIC[..begins] {
-            return Err(CheckpointError::NotOne { path: path() });
+            let help = "give the folder of a run; remove the file to start again";
+            return Err(unfit("is no checkpoint of flockform".to_owned(), help));
         }
-        if bytes.len() < HEADER {
-            let (found, needed) = (bytes.len() as u64, HEADER as u64);
-            return Err(CheckpointError::Truncated { path: path(), found, needed });
+        let found = bytes.len() as u64;
+        let truncated = |needed| unfit(format!("is truncated: it has {found} bytes of {needed}"), RESTORE);
+        if found < HEADER as u64 {
+            return Err(truncated(HEADER as u64));
         }
+        let of_another = |found: &str, known: &str| {
+            let help = "resume with the program that wrote it, or remove it and start the run again";
+            unfit(format!("is of {found}, this is {known}: the same bits cannot be promised"), help)
+        };
         let four = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
         let version = four(8);
         if version != VERSION {
-            let (found, known) = (format!("layout {version}"), format!("layout {VERSION}"));
-            return Err(CheckpointError::Version { path: path(), found, known });
+            return Err(of_another(&format!("layout {version}"), &format!("layout {VERSION}")));
         }
         let length = u64::from_le_bytes(bytes[12..20].try_into().expect("eight bytes"));
-        let (found, needed) = (bytes.len() as u64, length.saturating_add(HEADER as u64));
+        let needed = length.saturating_add(HEADER as u64);
         if found < needed {
-            return Err(CheckpointError::Truncated { path: path(), found, needed });
+            return Err(truncated(needed));
         }
-        let corrupted = |what: &str| CheckpointError::Corrupted { path: path(), what: what.to_owned() };
+        let corrupted = |what: &str| CheckpointError::corrupted(path.to_owned(), what);
         if found > needed {
             return Err(corrupted("bytes follow its end"));
         }
@@ -331,7 +322,7 @@ impl Checkpoint<'static> {
             .map_err(|_| corrupted("it names no version of flockform"))?;
         if program != PROGRAM_VERSION {
             let (found, known) = (format!("flockform {program}"), format!("flockform {PROGRAM_VERSION}"));
-            return Err(CheckpointError::Version { path: path(), found, known });
+            return Err(of_another(&found, &known));
         }
         postcard::from_bytes(&bytes[HEADER..])
             .map_err(|error| corrupted(&format!("its checksum is right, but {error}")))
@@ -399,11 +390,6 @@ fn remove_parts(folder: &Path, is_kept: impl Fn(&str) -> bool) {
             tracing::warn!("{name} is left in {}: {error}", folder.display());
         }
     }
-}
-
-/// A name that was given in a folder outlives a power cut only when the folder itself is on the disk.
-fn sync_folder(folder: &Path) -> std::io::Result<()> {
-    if cfg!(unix) { File::open(folder)?.sync_all() } else { Ok(()) }
 }
 
 fn as_json(scene: &Scene) -> String {

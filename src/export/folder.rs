@@ -12,11 +12,12 @@
 use std::ffi::OsString;
 use std::fs::{self, File, TryLockError};
 use std::io::ErrorKind;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use super::error::ExportError;
-use super::manifest::{NotOurs, Ours, Written};
+use super::manifest::{Ours, Written};
 use super::{checkpoint, sweep};
 
 /// A folder being filled. Dropped without [`OutputFolder::commit`] or [`OutputFolder::keep_unfinished`], it
@@ -272,16 +273,7 @@ fn make_way(unfinished: &Path, force: bool) -> Result<(), ExportError> {
 
 /// Removes a folder of outputs that holds nothing else.
 fn remove(folder: &Path) -> Result<(), ExportError> {
-    let ours = Ours::in_folder(folder).map_err(|error| not_ours(folder, error))?;
-    ours.remove().map_err(ExportError::io("remove", folder))
-}
-
-fn not_ours(folder: &Path, error: NotOurs) -> ExportError {
-    match error {
-        NotOurs::NoList => ExportError::NotOurs(folder.to_owned()),
-        NotOurs::Foreign(files) => ExportError::Foreign { folder: folder.to_owned(), files },
-        NotOurs::Io(source) => ExportError::io("look into", folder)(source),
-    }
+    Ours::in_folder(folder)?.remove().map_err(ExportError::io("remove", folder))
 }
 
 /// Whether a folder is in the hands of another program.
@@ -332,16 +324,10 @@ fn claim(out: &Path) -> Result<(PathBuf, Option<File>), ExportError> {
 
 /// Whether a path leads to the folder that was opened at it; where none could be opened, whether to any.
 fn is_at(folder: Option<&File>, path: &Path) -> bool {
-    match folder {
-        #[cfg(unix)]
-        Some(folder) => {
-            use std::os::unix::fs::MetadataExt;
-            let identity = |found: fs::Metadata| (found.dev(), found.ino());
-            let at_path = fs::metadata(path).map(identity).ok();
-            at_path.is_some() && at_path == folder.metadata().map(identity).ok()
-        }
-        _ => path.exists(),
-    }
+    let Some(folder) = folder else { return path.exists() };
+    let identity = |found: fs::Metadata| (found.dev(), found.ino());
+    let at_path = fs::metadata(path).map(identity).ok();
+    at_path.is_some() && at_path == folder.metadata().map(identity).ok()
 }
 
 /// A killed program may not even have begun its list.
@@ -376,9 +362,7 @@ fn standing(out: &Path, force: bool) -> Result<Standing, ExportError> {
     match entries.next() {
         None => Ok(Standing::EmptyFolder),
         Some(_) if !force => Err(ExportError::NotEmpty(out.to_owned())),
-        Some(_) => {
-            Ours::in_folder(out).map(|_| Standing::FormerOutputs).map_err(|error| not_ours(out, error))
-        }
+        Some(_) => Ours::in_folder(out).map(|_| Standing::FormerOutputs),
     }
 }
 
@@ -397,7 +381,7 @@ fn rename(from: &Path, to: &Path) -> Result<(), ExportError> {
     fs::rename(from, to).map_err(ExportError::io("rename the finished folder to", to))
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

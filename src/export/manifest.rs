@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::checkpoint;
+use super::error::ExportError;
 
 /// Its name in the folder.
 pub const FILE: &str = "flockform-files.txt";
@@ -123,25 +124,18 @@ pub(super) struct Ours {
     folders: Vec<PathBuf>,
 }
 
-/// The reason for which a folder is not flockform's.
-#[derive(Debug)]
-pub(super) enum NotOurs {
-    /// It has no list.
-    NoList,
-    /// A few of the files that are not in the list.
-    Foreign(Vec<PathBuf>),
-    Io(io::Error),
-}
-
 impl Ours {
     /// Looks through a folder; symbolic links are not followed, and are never ours.
-    pub fn in_folder(root: &Path) -> Result<Self, NotOurs> {
-        let Some(names) = read(root) else { return Err(NotOurs::NoList) };
+    ///
+    /// # Errors
+    /// A folder without a list, a few of the files that are not in it, and a folder that cannot be looked into.
+    pub fn in_folder(root: &Path) -> Result<Self, ExportError> {
+        let names = read(root).ok_or_else(|| ExportError::NotOurs(root.to_owned()))?;
         let mut ours = Self { files: Vec::new(), folders: Vec::new() };
-        let mut foreign = Vec::new();
-        ours.look(root, Path::new(""), &names, &mut foreign).map_err(NotOurs::Io)?;
+        let mut files = Vec::new();
+        ours.look(root, Path::new(""), &names, &mut files).map_err(ExportError::io("look into", root))?;
         ours.folders.push(root.to_owned());
-        if foreign.is_empty() { Ok(ours) } else { Err(NotOurs::Foreign(foreign)) }
+        if files.is_empty() { Ok(ours) } else { Err(ExportError::Foreign { folder: root.to_owned(), files }) }
     }
 
     fn look(
@@ -167,9 +161,9 @@ impl Ours {
                         self.files.extend(inner.files);
                         self.folders.extend(inner.folders);
                     }
-                    Err(NotOurs::Io(error)) => return Err(error),
-                    Err(NotOurs::NoList) => foreign.push(path),
-                    Err(NotOurs::Foreign(inner)) => foreign.extend(inner),
+                    Err(ExportError::Io { source, .. }) => return Err(source),
+                    Err(ExportError::Foreign { files, .. }) => foreign.extend(files),
+                    Err(_) => foreign.push(path),
                 }
             } else if kind.is_dir() && (is_listed || leads_to_listed()) {
                 self.look(root, &name, names, foreign)?;

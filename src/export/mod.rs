@@ -30,15 +30,15 @@
 //! use std::ops::ControlFlow;
 //! use std::path::Path;
 //! use flockform::continuum::{plan::Plan, record::Snapshot, run::run};
-//! use flockform::export::{Drawing, OutputFolder, Results, Timings, VtkSeries, write_all};
+//! use flockform::export::{Drawing, OutputFolder, Records, Results, Timings, VtkSeries, write_all};
 //!
 //! let scene = flockform::scene::bundled("fracture").expect("bundled").load(&[])?;
 //! let folder = OutputFolder::create(Path::new("out/fracture"), false)?;
 //! let mut frames = VtkSeries::create(&folder)?;
-//! let mut snapshots = Vec::new();
+//! let mut records = Records::default();
 //! let outcome = run(Plan::new(&scene)?, &mut |engine, _residual| {
 //!     if scene.record.figures.contains(&engine.step()) {
-//!         snapshots.push(Snapshot::of(engine));
+//!         records.snapshots.push(Snapshot::of(engine));
 //!     }
 //!     match frames.write(engine) {
 //!         Ok(()) => ControlFlow::Continue(()),
@@ -47,8 +47,7 @@
 //! });
 //! frames.finish()?;
 //! let timings = Timings::default();
-//! let (scene, outcome, snapshots) = (&scene, &outcome, &snapshots[..]);
-//! let results = Results { scene, outcome, snapshots, drawn: &[], probes: &[], load_steps: &[], timings };
+//! let results = Results { scene: &scene, outcome: &outcome, records: &records, timings };
 //! write_all(&folder, &results, Drawing::default())?;
 //! println!("written to {}", folder.commit()?.display());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -103,7 +102,7 @@ use figures::{Formats, Subject};
 pub use folder::{OutputFolder, out_of, unfinished};
 pub use manifest::write_new;
 pub use summary::{
-    BrokenBonds, Counts, Energies, Equilibrium, FirstBreak, Measured, Seconds, Signed, Summary, Timings,
+    BrokenBonds, Counts, Energies, Equilibrium, FirstBreak, Measured, Signed, Summary, Timings,
 };
 pub use vtk::{VtkSeries, write_piece};
 
@@ -114,16 +113,23 @@ pub struct Results<'a> {
     pub scene: &'a Scene,
     /// How the run ended, with the engine as it then was.
     pub outcome: &'a Outcome,
-    /// The configurations to draw.
-    pub snapshots: &'a [Snapshot],
-    /// Figures that are drawn already ([`Drawn::of`]).
-    pub drawn: &'a [Drawn],
-    /// Histories of the probed particles.
-    pub probes: &'a [ProbeSeries],
-    /// The work of a changing load, where the scene has one.
-    pub load_steps: &'a [LoadStep],
+    /// What was recorded on the way.
+    pub records: &'a Records,
     /// Times of the parts of the run so far.
     pub timings: Timings,
+}
+
+/// The records of a run.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Records {
+    /// Configurations to draw at the end.
+    pub snapshots: Vec<Snapshot>,
+    /// Figures that are drawn already ([`Drawn::of`]).
+    pub drawn: Vec<Drawn>,
+    /// Histories of the probed particles.
+    pub probes: Vec<ProbeSeries>,
+    /// The response to a changing load, where the scene has one.
+    pub load_steps: Vec<LoadStep>,
 }
 
 /// A figure that was drawn when its step came: of a body so large that it is drawn as squares, whose configuration would take
@@ -204,9 +210,10 @@ fn write_others(
 ) -> Result<Vec<PathBuf>, ExportError> {
     let Outcome { engine, solved, .. } = results.outcome;
     let (body, breaks) = (engine.body(), engine.breaks());
+    let Records { probes, load_steps, .. } = results.records;
     let mut written = Vec::new();
-    if !results.probes.is_empty() {
-        written.push(csv::write_probes(folder, body, results.probes)?);
+    if !probes.is_empty() {
+        written.push(csv::write_probes(folder, body, probes)?);
     }
     if !breaks.is_empty() {
         written.push(csv::write_breaks(folder, body, breaks)?);
@@ -214,8 +221,8 @@ fn write_others(
     if let Some(solved) = solved {
         written.push(csv::write_residuals(folder, &solved.residuals)?);
     }
-    if !results.load_steps.is_empty() {
-        written.push(load::write_load(folder, results.scene, results.load_steps)?);
+    if !load_steps.is_empty() {
+        written.push(load::write_load(folder, results.scene, load_steps)?);
     }
     if drawing.formats != Formats::None {
         written.extend(draw_all(folder, results, drawing)?);
@@ -324,7 +331,8 @@ fn figures_of_snapshot<'a>(
 }
 
 fn figures_of<'a>(results: &'a Results<'_>, subject: &'a Subject<'_>, units: &'a Units) -> Vec<Figure<'a>> {
-    let Results { scene, outcome, snapshots, drawn, probes, load_steps, .. } = *results;
+    let Results { scene, outcome, records, .. } = *results;
+    let Records { snapshots, drawn, probes, load_steps } = records;
     let already = |one: &'a Drawn| -> Figure<'a> { (one.name.clone(), Box::new(|| one.svg.clone())) };
     let to_draw =
         snapshots.iter().flat_map(|snapshot| figures_of_snapshot(&outcome.engine, subject, units, snapshot));

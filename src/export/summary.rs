@@ -5,7 +5,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::error::{ExportError, write_file};
 use super::{OutputFolder, bonds, largest_strain};
@@ -74,15 +74,22 @@ const AT_REST: f64 = 1e-6;
 /// Ratio of the stiffnesses of a body's materials beyond which rounding may leave too little of the softest's \[1\].
 const MOST_CONTRAST: f64 = 1e8;
 
-/// Times of the parts of a run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// Times of the parts of a run, as JSON in seconds.
+#[derive(Clone, Copy, Debug, Default, Serialize, PartialEq, Eq)]
 pub struct Timings {
     /// From the scene file to the engine.
+    #[serde(rename = "setup_s", serialize_with = "as_seconds")]
     pub setup: Duration,
     /// All steps, or the solve of the equilibrium.
+    #[serde(rename = "steps_s", serialize_with = "as_seconds")]
     pub steps: Duration,
     /// Outputs written while the run went on; writing the others is added to it.
+    #[serde(rename = "output_s", serialize_with = "as_seconds")]
     pub output: Duration,
+}
+
+fn as_seconds<S: Serializer>(time: &Duration, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_f64(time.as_secs_f64())
 }
 
 /// The contents of `summary.json`; lengths in the scene's unit, infinities as `null`.
@@ -120,7 +127,7 @@ pub struct Summary {
     /// Bonds that are broken at the end.
     pub broken_bonds: BrokenBonds,
     /// How long the parts of the run took.
-    pub timings: Seconds,
+    pub timings: Timings,
     /// The scene, its defaults and overrides included.
     pub scene: RawScene,
 }
@@ -218,17 +225,6 @@ pub struct Equilibrium {
     pub phases: BTreeMap<&'static str, f64>,
 }
 
-/// [`Timings`] in seconds.
-#[derive(Clone, Copy, Debug, Serialize, PartialEq)]
-pub struct Seconds {
-    /// From the scene file to the engine \[s\].
-    pub setup_s: f64,
-    /// All steps, or the solve of the equilibrium \[s\].
-    pub steps_s: f64,
-    /// Outputs \[s\].
-    pub output_s: f64,
-}
-
 impl Summary {
     /// The summary of a run that took this long, made by all ranks together where each has a part of the body; `measured` is what there is to measure at its end.
     pub fn new(scene: &Scene, outcome: &Outcome, measured: Option<Measured>, timings: Timings) -> Self {
@@ -275,11 +271,7 @@ impl Summary {
                 .collect(),
             mechanics: measured,
             broken_bonds: broken_bonds(&outcome.engine),
-            timings: Seconds {
-                setup_s: timings.setup.as_secs_f64(),
-                steps_s: timings.steps.as_secs_f64(),
-                output_s: timings.output.as_secs_f64(),
-            },
+            timings,
             scene: scene.raw.clone(),
         }
     }

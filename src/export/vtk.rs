@@ -260,32 +260,32 @@ fn write_frame(path: &Path, values: &Values<'_>) -> io::Result<Listed> {
 struct Values<'a> {
     engine: &'a Engine,
     stresses: Option<Stresses>,
-    others: Others,
-}
-
-/// The numbers of particles of other parts.
-#[derive(Default)]
-struct Others {
-    energies: HashMap<usize, [f64; 2]>,
-    strains: HashMap<usize, [f64; 4]>,
-    stresses: HashMap<usize, [f64; 4]>,
+    energies_of_others: HashMap<usize, [f64; 2]>,
+    strains_of_others: HashMap<usize, [f64; 4]>,
+    stresses_of_others: HashMap<usize, [f64; 4]>,
 }
 
 impl<'a> Values<'a> {
     /// At the engine's present places; of a body in parts found by all ranks together.
     fn of(engine: &'a Engine) -> Self {
-        let own = Self { engine, stresses: Stresses::at_present(engine), others: Others::default() };
-        let others = Others {
-            energies: engine.of_others(|i| own.energies(i)),
-            strains: engine.of_others(|i| own.strain(i)),
-            stresses: engine.of_others(|i| own.stress(i)),
+        let own = Self {
+            engine,
+            stresses: Stresses::at_present(engine),
+            energies_of_others: HashMap::new(),
+            strains_of_others: HashMap::new(),
+            stresses_of_others: HashMap::new(),
         };
-        Self { others, ..own }
+        Self {
+            energies_of_others: engine.of_others(|i| own.energies(i)),
+            strains_of_others: engine.of_others(|i| own.strain(i)),
+            stresses_of_others: engine.of_others(|i| own.stress(i)),
+            ..own
+        }
     }
 
     /// PE1 \[length^2\] and PE2 \[length\].
     fn energies(&self, particle: usize) -> [f64; 2] {
-        let known = self.others.energies.get(&particle).copied();
+        let known = self.energies_of_others.get(&particle).copied();
         known.unwrap_or_else(|| [self.engine.pe1(particle), self.engine.pe2(particle)])
     }
 
@@ -297,13 +297,13 @@ impl<'a> Values<'a> {
                 [xx, yy, xy, rotation]
             })
         };
-        self.others.strains.get(&particle).copied().unwrap_or_else(own)
+        self.strains_of_others.get(&particle).copied().unwrap_or_else(own)
     }
 
     /// Components and von Mises stress, NaN for a particle in no whole cell \[force / length^2\].
     fn stress(&self, particle: usize) -> [f64; 4] {
         let own = || self.stresses.as_ref().and_then(|stresses| stresses.particles[particle]);
-        let known = self.others.stresses.get(&particle).copied();
+        let known = self.stresses_of_others.get(&particle).copied();
         known.unwrap_or_else(|| own().map_or([f64::NAN; 4], |stress| with_von_mises(&stress)))
     }
 }

@@ -32,23 +32,9 @@ pub(crate) struct System {
     pub load: Vec<f64>,
 }
 
-/// Builds the reduced system.
-pub(crate) fn assemble(problem: &Problem, prescribed: &[Option<f64>]) -> System {
-    assemble_for(problem, prescribed, &nodal_loads(problem), None)
-}
-
-/// The system of a step from a displacement: its tangent, the forces \[N\] that are left there, shape \[nodes\], and
-/// the steps of prescribed components.
-pub(crate) fn assemble_at(
-    problem: &Problem,
-    steps: &[Option<f64>],
-    left: &[[f64; 2]],
-    at: &Solution,
-) -> System {
-    assemble_for(problem, steps, left, Some(at))
-}
-
-fn assemble_for(
+/// Builds the reduced system of the nodal forces \[N\], shape \[nodes\]; at a displacement that of a step from there: its
+/// tangent, the forces that are left, and the steps of prescribed components.
+pub(crate) fn assemble(
     problem: &Problem,
     prescribed: &[Option<f64>],
     forces: &[[f64; 2]],
@@ -235,7 +221,7 @@ mod tests {
     #[test]
     fn the_free_stiffness_has_no_force_for_translations_and_rotation() {
         let p = unit();
-        let system = assemble(&p, &p.prescribed);
+        let system = assemble(&p, &p.prescribed, &nodal_loads(&p), None);
         for motion in [|_| [1.0, 0.0], |_| [0.0, 1.0], |[x, y]: [f64; 2]| [-y, x]] {
             let u: Vec<f64> = p.mesh.points().into_iter().flat_map(motion).collect();
             let mut force = vec![0.0; u.len()];

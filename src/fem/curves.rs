@@ -1,10 +1,10 @@
 //! The curves that a mesh has to follow: the pieces of an outline and lines inside the body, cut where they meet
 //! and where something begins or ends.
 
-use crate::geometry::meeting::{crossings, on};
+use crate::geometry::meeting::crossings;
 use crate::geometry::outline::{Outline, Place};
-use crate::geometry::piece::{Arc, Piece};
-use crate::geometry::point::{Point, distance};
+use crate::geometry::piece::Piece;
+use crate::geometry::point::{Point, cross, distance, dot};
 
 /// Points nearer than this part of the body's size are one.
 pub(crate) const MERGED: f64 = 1e-6;
@@ -89,10 +89,11 @@ impl Curves {
         }
         for inner in outer..self.curves.len() {
             let piece = &self.curves[inner].piece;
-            cuts[inner][0].1 = self.of_line_end(outer, inner, piece.from, piece.tangent(0.0));
-            cuts[inner][1].1 = self.of_line_end(outer, inner, piece.to, piece.tangent(1.0).map(|v| -v));
+            for (end, (at, inward)) in piece.leaving().into_iter().enumerate() {
+                cuts[inner][end].1 = self.of_line_end(outer, inner, at, inward);
+            }
             for other in (0..self.curves.len()).filter(|&other| other < outer || other > inner) {
-                for [t, s] in meetings(&self.curves[inner].piece, &self.curves[other].piece, near) {
+                for [t, s] in crossings(piece, &self.curves[other].piece, near) {
                     let grading = if other < outer { LINE_END } else { 0.0 };
                     cuts[inner].push((t, grading));
                     cuts[other].push((s, grading));
@@ -107,11 +108,8 @@ impl Curves {
     fn of_line_end(&self, outer: usize, line: usize, end: Point, inward: Point) -> f64 {
         let near = MERGED * self.size;
         let goes_on = |other: &Curve| {
-            let ends = [(other.piece.from, other.piece.tangent(0.0)), {
-                (other.piece.to, other.piece.tangent(1.0).map(|v| -v))
-            }];
-            ends.iter()
-                .any(|(at, to)| distance(*at, end) <= near && to[0] * inward[0] + to[1] * inward[1] < -0.9)
+            let ends = other.piece.leaving();
+            ends.into_iter().any(|(at, to)| distance(at, end) <= near && dot(to, inward) < -0.9)
         };
         let others = self.curves[outer..].iter().enumerate().filter(|&(k, _)| outer + k != line);
         let own = &self.curves[line].piece;
@@ -199,23 +197,9 @@ impl Curves {
 /// a power of the distance between 1 (straight) and 1/2 (a crack) (M. L. Williams, J. Appl. Mech. 19 (1952) 526).
 fn of_corner(before: &Piece, after: &Piece) -> f64 {
     let (a, b) = (before.tangent(1.0), after.tangent(0.0));
-    let turn = (a[0] * b[1] - a[1] * b[0]).atan2(a[0] * b[0] + a[1] * b[1]);
+    let turn = cross(a, b).atan2(dot(a, b));
     // 20 degrees of a polygon that stands for an arc are no corner.
     if turn < -0.35 { 0.75 } else { 0.0 }
-}
-
-/// Where two curves cross, or touch but for `near`, as places along each.
-fn meetings(a: &Piece, b: &Piece, near: f64) -> Vec<[f64; 2]> {
-    let mut found = crossings(a, b, near);
-    if found.is_empty() {
-        // What touches an arc does so where it is nearest to its centre.
-        let touch = |(piece, arc): (&Piece, Option<Arc>)| {
-            let p = piece.point(piece.nearest(arc?.centre));
-            Some([on(a, p, near)?, on(b, p, near)?])
-        };
-        found.extend([(a, b.arc), (b, a.arc)].into_iter().filter_map(touch));
-    }
-    found
 }
 
 #[cfg(test)]
@@ -266,25 +250,5 @@ mod tests {
         let curves = Curves::new(&plate(), &[], &[], &points);
         assert_eq!((curves.junctions.len(), curves.spans.len()), (4 + 1 + 2, 6));
         assert_eq!(curves.junctions.iter().filter(|j| j.grading == 0.5).count(), 3);
-    }
-
-    #[test]
-    fn what_touches_an_arc_but_for_a_gap_below_near_meets_it_there_and_what_is_farther_does_not() {
-        let circle = |x: f64, radius: f64| Piece::arc([x, 0.0], radius, 1.0, std::f64::consts::TAU);
-        let beside = |gap: f64| {
-            let edge = Piece::edge([1.0 + gap, -1.0], [1.0 + gap, 2.0]);
-            [circle(3.0 + gap, 2.0), circle(0.5 - gap, 0.5), edge]
-        };
-        let one = circle(0.0, 1.0);
-        for other in [0.0, 1e-9].into_iter().flat_map(beside) {
-            for (a, b) in [(&one, &other), (&other, &one)] {
-                let places = meetings(a, b, 1e-8);
-                let is_there = |[s, t]: &[f64; 2]| {
-                    [a.point(*s), b.point(*t)].iter().all(|p| distance(*p, [1.0, 0.0]) <= 2e-8)
-                };
-                assert!(!places.is_empty() && places.iter().all(is_there), "{a:?} {b:?}: {places:?}");
-            }
-        }
-        assert!(beside(1e-7).iter().all(|other| meetings(&one, other, 1e-8).is_empty()));
     }
 }

@@ -13,7 +13,7 @@ use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, PositionInTri
 use super::curves::Curves;
 use super::error::FemError;
 use super::size::{GROWTH, Sizes};
-use crate::geometry::point::{Point, area, distance};
+use crate::geometry::point::{Point, area, distance, dot};
 
 /// Radius of the circumscribed circle over the size asked for, above which a triangle is too large.
 const LARGE: f64 = 0.75;
@@ -356,15 +356,9 @@ impl Mesher<'_> {
 
 /// Whether two curves with a common end turn less than 60 degrees from one to the other there.
 fn is_sharp(curves: &Curves, p: usize, q: usize) -> bool {
-    let [a, b] = [p, q].map(|k| &curves.curves[k].piece);
-    let leaving = |piece: &crate::geometry::piece::Piece| {
-        [(piece.from, piece.tangent(0.0)), (piece.to, piece.tangent(1.0).map(|v| -v))]
-    };
-    let mut sharp = false;
-    for ((at_a, u), (at_b, v)) in leaving(a).into_iter().flat_map(|u| leaving(b).map(|v| (u, v))) {
-        sharp |= distance(at_a, at_b) < 1e-6 * curves.size && u[0] * v[0] + u[1] * v[1] > 0.5;
-    }
-    sharp
+    let [a, b] = [p, q].map(|k| curves.curves[k].piece.leaving());
+    let mut pairs = a.into_iter().flat_map(|one| b.map(|other| (one, other)));
+    pairs.any(|((p, u), (q, v))| distance(p, q) < 1e-6 * curves.size && dot(u, v) > 0.5)
 }
 
 /// Centre and radius of the circumscribed circle.

@@ -22,16 +22,9 @@ pub enum FemError {
         /// "finite", "symmetric" or "positive definite".
         lacking: &'static str,
     },
-    /// Arrays that do not belong together.
-    #[error("{what}: length {found}, expected {expected}")]
-    Length {
-        /// Which array.
-        what: &'static str,
-        /// Its length.
-        found: usize,
-        /// The length that fits.
-        expected: String,
-    },
+    /// A mesh that shall have no cells.
+    #[error("cells: length 0, expected at least 1")]
+    NoCells,
     /// A NaN or an infinity in the input.
     #[error("{what} {index} holds a value that is not finite")]
     NotFinite {

@@ -41,17 +41,12 @@ pub struct Material {
 /// Parts of a body that are of other materials.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Inclusions {
-    materials: Vec<Material>,
+    pub(super) materials: Vec<Material>,
     /// By cell of the mesh: 0 is none, others count from 1; empty where there are no inclusions.
-    of_cell: Vec<u32>,
+    pub(super) of_cell: Vec<u32>,
 }
 
 impl Inclusions {
-    /// Materials, and by cell of the mesh which of them it is of: 0 is none, others count from 1.
-    pub fn new(materials: Vec<Material>, of_cell: Vec<u32>) -> Self {
-        Self { materials, of_cell }
-    }
-
     /// The material of a cell; `body` is the one outside inclusions.
     pub fn material<'a>(&'a self, cell: usize, body: &'a Material) -> &'a Material {
         let number = self.of_cell.get(cell).copied().unwrap_or(0);

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use super::element::{CORNERS, NODES, Pairs, REFERENCE_NODES, Rule, Shape, side_nodes};
 use super::error::FemError;
 use crate::geometry::lists::lists_of;
+use crate::geometry::point::bounds;
 
 /// Quadratic triangles: the nodes as parallel arrays, and those of each cell: corners counter-clockwise, then the middle of
 /// the side behind each. Coordinates are finite and every cell has positive area.
@@ -45,12 +46,8 @@ impl Mesh {
         let (inner, outer) = (Rule::of_stiffness(), REFERENCE_NODES.map(Shape::at));
         for cell in 0..self.cell_count() {
             let at = self.positions(cell);
-            let extent = |i: usize| {
-                let (low, high) =
-                    at.iter().fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p[i]), h.max(p[i])));
-                high - low
-            };
-            let slack = 1e-12 * (extent(0).powi(2) + extent(1).powi(2));
+            let (low, high) = bounds(at);
+            let slack = 1e-12 * ((high[0] - low[0]).powi(2) + (high[1] - low[1]).powi(2));
             let inside = inner.points.iter().map(|(s, _)| s.determinant(&at)).fold(f64::MAX, f64::min);
             let at_nodes = outer.iter().map(|s| s.determinant(&at)).fold(f64::MAX, f64::min);
             if inside <= slack || at_nodes < -slack {

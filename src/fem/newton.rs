@@ -1,12 +1,11 @@
 //! The equilibrium of a body that turns far: Newton's method on the first derivatives of its energy, along as many
 //! parts of the way as it takes.
 
-use super::assemble::{System, assemble, assemble_at, nodal_loads};
+use super::assemble::{System, assemble, nodal_loads};
 use super::error::FemError;
 use super::problem::Problem;
 use super::solution::Solution;
 use super::solve::solve_tangent;
-use super::strain::Strain;
 
 /// Steps of Newton's method for a part of the way, at most.
 const MOST_STEPS: usize = 25;
@@ -35,10 +34,11 @@ pub(crate) fn solve_turning(
     start: Option<Vec<f64>>,
     led: Option<&Held<'_>>,
 ) -> Result<Solution, FemError> {
-    let size_of = |prescribed: &[Option<f64>]| norm(&assemble(problem, prescribed).load);
+    let loads = nodal_loads(problem);
+    let size_of = |prescribed: &[Option<f64>]| norm(&assemble(problem, prescribed, &loads, None).load);
     let looks = led.into_iter().flat_map(|led| (1..LOOKS).map(move |k| led(f64::from(k) / f64::from(LOOKS))));
     let size = looks.map(|held| size_of(&held)).fold(size_of(&problem.prescribed), f64::max);
-    let way = Way { problem, led, loads: nodal_loads(problem), size };
+    let way = Way { problem, led, loads, size };
     let at_rest = way.solution(vec![0.0; problem.prescribed.len()])?;
     if way.size == 0.0 {
         return Ok(at_rest);
@@ -74,8 +74,7 @@ struct Way<'a> {
 impl Way<'_> {
     fn solution(&self, u: Vec<f64>) -> Result<Solution, FemError> {
         let (ux, uy) = u.chunks(2).map(|u| (u[0], u[1])).unzip();
-        let found = Solution::from_displacements(self.problem.mesh.clone(), self.problem.material, ux, uy);
-        Ok(found?.with_inclusions(self.problem.inclusions.clone()).with_strain(Strain::Stretch))
+        Solution::of(self.problem, ux, uy)
     }
 
     /// What is prescribed after a part of the way.
@@ -109,7 +108,7 @@ impl Way<'_> {
             if !residual.is_finite() || residual > 1e6 {
                 return Ok(None);
             }
-            let system = assemble_at(self.problem, &steps, &left, &at);
+            let system = assemble(self.problem, &steps, &left, Some(&at));
             let moved = match self.moved(&system, &steps) {
                 // Nothing resists a motion.
                 Err(FemError::Singular { .. }) => return Ok(None),

@@ -65,10 +65,10 @@ impl OutlineMesh {
     ///
     /// # Errors
     /// [`FemError::Unmeshable`] where curves come too close to each other, [`FemError::InvertedCell`] where an arc
-    /// is too bent for the cells beside it, [`FemError::Length`] if no cells are asked for.
+    /// is too bent for the cells beside it, [`FemError::NoCells`] if no cells are asked for.
     pub fn new(outline: &Outline, request: &MeshRequest<'_>) -> Result<OutlineMesh, FemError> {
         if request.cells == 0 {
-            return Err(FemError::Length { what: "cells", found: 0, expected: "at least 1".into() });
+            return Err(FemError::NoCells);
         }
         let curves = Curves::new(outline, request.lines, request.places, request.points);
         // Equilateral triangles of side a have the area 0.433 a^2.

@@ -6,7 +6,7 @@ use super::Mesh;
 use super::curves::MERGED;
 use super::error::FemError;
 use super::material::{Inclusions, Material};
-use super::outline_mesh::OutlineMesh;
+use super::outline_mesh::{OutlineMesh, OutlineSide};
 use super::problem::{Problem, Traction};
 use super::strain::Strain;
 use crate::geometry::outline::{Outline, Place};
@@ -250,9 +250,7 @@ impl<'a> ShapeProblem<'a> {
             }
         }
         for traction in &self.tractions {
-            for side in
-                mesh.sides().iter().filter(|side| self.has(&traction.on, side.ring, side.piece, side.t))
-            {
+            for side in mesh.sides().iter().filter(|side| is_in(&traction.on, side)) {
                 problem.tractions.push(Traction::sampled(mesh.mesh(), side.side, &traction.traction));
             }
         }
@@ -293,14 +291,7 @@ impl<'a> ShapeProblem<'a> {
             last.map_or(0, |k| k as u32 + 1)
         };
         let materials = self.inclusions.iter().map(|(_, material)| *material).collect();
-        Inclusions::new(materials, (0..mesh.cell_count()).map(of_cell).collect())
-    }
-
-    /// Whether the middle of a stretch of a piece lies in one of the portions.
-    fn has(&self, portions: &[Portion], ring: usize, piece: usize, t: [f64; 2]) -> bool {
-        let middle = 0.5 * (t[0] + t[1]);
-        let of_piece = portions.iter().filter(|portion| portion.ring == ring && portion.piece == piece);
-        of_piece.clone().any(|portion| portion.t[0] <= middle && middle <= portion.t[1])
+        Inclusions { materials, of_cell: (0..mesh.cell_count()).map(of_cell).collect() }
     }
 
     fn nodes(&self, number: usize, on: &Holding, mesh: &OutlineMesh) -> Result<Vec<usize>, FemError> {
@@ -311,7 +302,7 @@ impl<'a> ShapeProblem<'a> {
         };
         Ok(match on {
             Holding::Portions(portions) => {
-                let sides = mesh.sides().iter().filter(|s| self.has(portions, s.ring, s.piece, s.t));
+                let sides = mesh.sides().iter().filter(|side| is_in(portions, side));
                 sides.flat_map(|side| mesh.mesh().side_nodes(side.side)).collect()
             }
             Holding::Region(PlaneRegion::Box { min, max }) => {
@@ -336,4 +327,10 @@ impl<'a> ShapeProblem<'a> {
         let nearest = (0..mesh.node_count()).min_by(|&a, &b| apart(a).total_cmp(&apart(b)));
         nearest.filter(|&node| apart(node) <= 2.0 * MERGED * self.outline.size())
     }
+}
+
+/// Whether the middle of a side lies in one of the portions.
+fn is_in(portions: &[Portion], side: &OutlineSide) -> bool {
+    let middle = Place { ring: side.ring, piece: side.piece, t: 0.5 * (side.t[0] + side.t[1]) };
+    portions.iter().any(|portion| portion.has(middle))
 }

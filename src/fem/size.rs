@@ -8,6 +8,7 @@
 use std::f64::consts::TAU;
 
 use super::curves::{Curves, Span};
+use crate::geometry::piece::Piece;
 use crate::geometry::point::{Point, distance};
 
 /// Growth of the size with the distance from something small.
@@ -71,13 +72,11 @@ impl<'c> Sizes<'c> {
     fn distance(&self, span: &Span, p: Point) -> f64 {
         let piece = &self.curves.curves[span.curve].piece;
         let t = piece.nearest(p);
-        let clamped = if t < span.t[0] || t > span.t[1] {
-            let ends = span.t.map(|t| distance(piece.point(t), p));
-            return ends[0].min(ends[1]);
-        } else {
-            t
-        };
-        distance(piece.point(clamped), p)
+        if span.t[0] <= t && t <= span.t[1] {
+            return distance(piece.point(t), p);
+        }
+        let ends = span.t.map(|t| distance(piece.point(t), p));
+        ends[0].min(ends[1])
     }
 
     /// Without regard to singular points.
@@ -120,13 +119,7 @@ impl<'c> Sizes<'c> {
     }
 
     /// Halves a stretch until it is as short as the cells there; leaves with the number of cells in each.
-    fn measure(
-        &self,
-        piece: &crate::geometry::piece::Piece,
-        t: [f64; 2],
-        depth: u32,
-        leaves: &mut Vec<([f64; 2], f64)>,
-    ) {
+    fn measure(&self, piece: &Piece, t: [f64; 2], depth: u32, leaves: &mut Vec<([f64; 2], f64)>) {
         let middle = 0.5 * (t[0] + t[1]);
         let length = (t[1] - t[0]) * piece.length();
         let size = [t[0], middle, t[1]].map(|t| self.at(piece.point(t)));

@@ -5,6 +5,7 @@ use super::error::FemError;
 use super::locate::Locator;
 use super::material::{Inclusions, Material, Stress};
 use super::mesh::Mesh;
+use super::problem::Problem;
 use super::strain::Strain;
 use crate::geometry::Point;
 
@@ -20,36 +21,22 @@ pub struct Solution {
 }
 
 impl Solution {
-    /// A field from its displacements `ux`, `uy` \[m\], shape \[nodes\].
+    /// A field of the body of a problem from its displacements `ux`, `uy` \[m\], shape \[nodes\].
     ///
     /// # Errors
     /// [`FemError::NotFinite`] for a NaN or an infinity.
-    pub(crate) fn from_displacements(
-        mesh: Mesh,
-        material: Material,
-        ux: Vec<f64>,
-        uy: Vec<f64>,
-    ) -> Result<Solution, FemError> {
+    pub(crate) fn of(problem: &Problem, ux: Vec<f64>, uy: Vec<f64>) -> Result<Solution, FemError> {
         if let Some(index) = (0..ux.len()).find(|&i| !(ux[i].is_finite() && uy[i].is_finite())) {
             return Err(FemError::NotFinite { what: "displacement of node", index });
         }
-        let (strain, inclusions) = (Strain::Small, Inclusions::default());
-        Ok(Solution { mesh, material, strain, inclusions, ux, uy })
-    }
-
-    /// The same displacements, another strain.
-    pub(crate) fn with_strain(self, strain: Strain) -> Solution {
-        Solution { strain, ..self }
+        let Problem { mesh, material, strain, inclusions, .. } = problem;
+        let (mesh, inclusions) = (mesh.clone(), inclusions.clone());
+        Ok(Solution { mesh, material: *material, strain: *strain, inclusions, ux, uy })
     }
 
     /// The undeformed mesh.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
-    }
-
-    /// The same field where some cells are of other materials.
-    pub(super) fn with_inclusions(self, inclusions: Inclusions) -> Self {
-        Solution { inclusions, ..self }
     }
 
     /// The material of a cell.
@@ -210,7 +197,7 @@ impl Solution {
 mod tests {
     use super::*;
     use crate::fem::by_hand::solve;
-    use crate::fem::{Orthotropic, Plane, problem::Problem};
+    use crate::fem::{Orthotropic, Plane};
 
     /// An affine displacement: its strain, and so its stress, is the same everywhere.
     fn affine(x: f64, y: f64) -> [f64; 2] {
@@ -328,7 +315,7 @@ mod tests {
 
     fn field(mesh: Mesh, u: impl Fn(f64, f64) -> [f64; 2]) -> Solution {
         let (ux, uy) = mesh.points().into_iter().map(|[x, y]| u(x, y).into()).unzip();
-        Solution::from_displacements(mesh, materials()[0], ux, uy).unwrap()
+        Solution::of(&Problem::new(mesh, materials()[0]), ux, uy).unwrap()
     }
 
     #[test]

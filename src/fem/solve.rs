@@ -10,7 +10,7 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
-use super::assemble::{System, assemble};
+use super::assemble::{System, assemble, nodal_loads};
 use super::error::FemError;
 use super::mesh::Mesh;
 use super::newton::{Held, solve_turning};
@@ -44,7 +44,7 @@ pub(crate) fn solve_near(
     if problem.strain == Strain::Stretch {
         return solve_turning(problem, start, led);
     }
-    let system = assemble(problem, prescribed);
+    let system = assemble(problem, prescribed, &nodal_loads(problem), None);
     let unknowns = if system.load.is_empty() { Vec::new() } else { solve_reduced(&system, &problem.mesh)? };
     let component = |c: usize| match system.unknown[c] {
         Some(i) => unknowns[i],
@@ -53,8 +53,7 @@ pub(crate) fn solve_near(
     let nodes = 0..problem.mesh.node_count();
     let ux = nodes.clone().map(|i| component(2 * i)).collect();
     let uy = nodes.map(|i| component(2 * i + 1)).collect();
-    let solution = Solution::from_displacements(problem.mesh.clone(), problem.material, ux, uy)?;
-    Ok(solution.with_inclusions(problem.inclusions.clone()))
+    Solution::of(problem, ux, uy)
 }
 
 /// A part (cells joined through nodes) is held if x and y are prescribed somewhere in it, and if no point

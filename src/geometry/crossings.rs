@@ -3,7 +3,7 @@
 use super::box_tree::BoxTree;
 use super::outline::OutlineError;
 use super::piece::Piece;
-use super::point::{Point, bounds, distance, minus};
+use super::point::{Point, bounds, cross, distance, dot, minus};
 
 /// A straight part of the outline, where it is tested for crossings.
 #[derive(Clone, Copy, Debug)]
@@ -69,10 +69,7 @@ fn check_pairs<I: Iterator<Item = usize>>(
             within(0) && within(1)
         };
         for b in ahead.filter(is_near) {
-            let place = match meeting(a.ends, b.ends, near) {
-                Some(place) => place,
-                None => continue,
-            };
+            let Some(place) = meeting(a.ends, b.ends, near) else { continue };
             if a.ring != b.ring {
                 let rings = [a.ring.min(b.ring), a.ring.max(b.ring)];
                 return Err(OutlineError::Touching { rings, place });
@@ -88,12 +85,11 @@ fn check_pairs<I: Iterator<Item = usize>>(
 
 /// Where two chords cross or come nearer than `near` \[length\].
 fn meeting(a: [Point; 2], b: [Point; 2], near: f64) -> Option<Point> {
-    let cross = |u: Point, v: Point| u[0] * v[1] - u[1] * v[0];
     // Most chords that are compared are beside each other: all of one lies to one side of the other.
     let is_beside = |[from, to]: [Point; 2], other: [Point; 2]| {
         let along = minus(to, from);
         // Twice as far as what is too near: sums are rounded.
-        let reach = 4.0 * near * near * (along[0] * along[0] + along[1] * along[1]);
+        let reach = 4.0 * near * near * dot(along, along);
         let [one, two] = other.map(|p| cross(along, minus(p, from)));
         one * two > 0.0 && (one * one).min(two * two) > reach
     };
@@ -133,16 +129,13 @@ mod tests {
     use std::f64::consts::TAU;
 
     use super::*;
+    use crate::geometry::box_tree::tests::chance;
     use crate::geometry::outline::edges;
     use crate::geometry::piece::reversed;
 
     #[test]
     fn the_crossing_that_is_named_is_the_one_that_a_look_at_every_pair_finds() {
-        let mut state: u64 = 1;
-        let mut next = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 40) as f64 / (1u64 << 24) as f64
-        };
+        let mut next = chance(1);
         let mut verdicts = [0; 3];
         for round in 0..600 {
             // Stars about the middle of a square do not cross themselves, and do not touch it but where one of their

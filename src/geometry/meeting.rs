@@ -1,17 +1,16 @@
 //! Where edges and arcs meet.
 
 use super::piece::{Arc, Piece};
-use super::point::distance;
+use super::point::{cross, distance, dot, minus};
 
 /// Where the segment from `a` to `b` meets a piece: shares of the way along either, from 0 to 1.
 pub fn meetings(a: [f64; 2], b: [f64; 2], piece: &Piece) -> Vec<[f64; 2]> {
-    let along = [b[0] - a[0], b[1] - a[1]];
-    let cross = |u: [f64; 2], v: [f64; 2]| u[0] * v[1] - u[1] * v[0];
+    let along = minus(b, a);
     let within = |s: &f64| (0.0..=1.0).contains(s);
     match &piece.arc {
         None => {
-            let other = [piece.to[0] - piece.from[0], piece.to[1] - piece.from[1]];
-            let off = [piece.from[0] - a[0], piece.from[1] - a[1]];
+            let other = minus(piece.to, piece.from);
+            let off = minus(piece.from, a);
             let turn = cross(along, other);
             let parallel = 1e-12 * along[0].hypot(along[1]) * other[0].hypot(other[1]);
             if turn.abs() <= parallel {
@@ -23,8 +22,7 @@ pub fn meetings(a: [f64; 2], b: [f64; 2], piece: &Piece) -> Vec<[f64; 2]> {
             if is_on { vec![[s, t.clamp(0.0, 1.0)]] } else { Vec::new() }
         }
         Some(arc) => {
-            let off = [a[0] - arc.centre[0], a[1] - arc.centre[1]];
-            let dot = |u: [f64; 2], v: [f64; 2]| u[0] * v[0] + u[1] * v[1];
+            let off = minus(a, arc.centre);
             let (p, q) = (dot(along, along), dot(off, along));
             let r = (off[0].hypot(off[1]) - arc.radius) * (off[0].hypot(off[1]) + arc.radius);
             let under = q * q - p * r;
@@ -141,5 +139,25 @@ mod tests {
         // Those that cross still do so twice.
         let [one, other] = [0.0, 4.0].map(|x| Piece::arc([x, 0.0], 3.0, 0.1, TAU));
         assert_eq!(crossings(&one, &other, near).len(), 2);
+    }
+
+    #[test]
+    fn what_touches_an_arc_but_for_a_gap_below_near_meets_it_there_and_what_is_farther_does_not() {
+        let circle = |x: f64, radius: f64| Piece::arc([x, 0.0], radius, 1.0, TAU);
+        let beside = |gap: f64| {
+            let edge = Piece::edge([1.0 + gap, -1.0], [1.0 + gap, 2.0]);
+            [circle(3.0 + gap, 2.0), circle(0.5 - gap, 0.5), edge]
+        };
+        let one = circle(0.0, 1.0);
+        for other in [0.0, 1e-9].into_iter().flat_map(beside) {
+            for (a, b) in [(&one, &other), (&other, &one)] {
+                let places = crossings(a, b, 1e-8);
+                let is_there = |[s, t]: &[f64; 2]| {
+                    [a.point(*s), b.point(*t)].iter().all(|p| distance(*p, [1.0, 0.0]) <= 2e-8)
+                };
+                assert!(!places.is_empty() && places.iter().all(is_there), "{a:?} {b:?}: {places:?}");
+            }
+        }
+        assert!(beside(1e-7).iter().all(|other| crossings(&one, other, 1e-8).is_empty()));
     }
 }

@@ -142,7 +142,7 @@ impl Outline {
 
     /// Every piece with the number of its loop and its own.
     pub fn pieces(&self) -> impl Iterator<Item = (usize, usize, &Piece)> {
-        numbered(&self.rings)
+        numbered(self.rings.iter().map(Vec::as_slice))
     }
 
     /// The piece with this number of its loop and its own, both from 0.

@@ -8,7 +8,7 @@ use std::collections::{HashMap, HashSet};
 
 use super::meeting::{crossings, on};
 use super::outline::{Outline, OutlineError, Place};
-use super::piece::Piece;
+use super::piece::{Piece, numbered};
 use super::point::{Point, distance};
 use super::shape::Shape;
 
@@ -101,8 +101,7 @@ impl Partition {
 
     /// Pieces of the outline and of lines, with the numbers of their loop or line and their own.
     pub fn pieces(&self) -> impl Iterator<Item = (usize, usize, &Piece)> {
-        let numbered = |(r, ring): (usize, &'_ [Piece])| (0..ring.len()).map(move |p| (r, p));
-        self.rings().enumerate().flat_map(numbered).map(|(r, p)| (r, p, self.piece(r, p)))
+        numbered(self.rings())
     }
 
     /// Pieces of the lines inside.

@@ -102,6 +102,11 @@ impl Piece {
         [y, -x]
     }
 
+    /// Both ends, each with the direction from there into the piece, of length 1.
+    pub(crate) fn leaving(&self) -> [(Point, Point); 2] {
+        [(self.from, self.tangent(0.0)), (self.to, self.tangent(1.0).map(|v| -v))]
+    }
+
     /// \[length\]
     pub fn length(&self) -> f64 {
         match &self.arc {
@@ -178,9 +183,11 @@ impl Piece {
 }
 
 /// Every piece of some loops or lines with the number of its loop and its own.
-pub(super) fn numbered(rings: &[Vec<Piece>]) -> impl Iterator<Item = (usize, usize, &Piece)> {
-    let of_ring = |(r, ring): (usize, &'_ Vec<Piece>)| (0..ring.len()).map(move |p| (r, p));
-    rings.iter().enumerate().flat_map(of_ring).map(|(r, p)| (r, p, &rings[r][p]))
+pub(super) fn numbered<'a>(
+    rings: impl Iterator<Item = &'a [Piece]>,
+) -> impl Iterator<Item = (usize, usize, &'a Piece)> {
+    let of_ring = |(r, ring): (usize, &'a [Piece])| ring.iter().enumerate().map(move |(p, one)| (r, p, one));
+    rings.enumerate().flat_map(of_ring)
 }
 
 /// The same loop the other way round; its first piece stays the first, and corners stay corners.

@@ -67,6 +67,11 @@ impl Portion {
         self.t.map(|t| Place { ring: self.ring, piece: self.piece, t })
     }
 
+    /// Whether a place lies in it.
+    pub fn has(&self, place: Place) -> bool {
+        (self.ring, self.piece) == (place.ring, place.piece) && self.t[0] <= place.t && place.t <= self.t[1]
+    }
+
     /// \[length\]
     pub fn length(&self, outline: &Outline) -> f64 {
         (self.t[1] - self.t[0]) * outline.piece(self.ring, self.piece).length()

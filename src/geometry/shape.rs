@@ -53,7 +53,7 @@ impl Shape {
             Shape::Disc { centre, radius } => {
                 (point[0] - centre[0]).hypot(point[1] - centre[1]) <= radius + tolerance
             }
-            Shape::Polygon { vertices } => polygon_contains(vertices, 0..vertices.len(), point, tolerance),
+            Shape::Polygon { vertices } => polygon_contains(vertices, point, tolerance),
             Shape::Path { pieces } => path_contains(pieces.iter(), point, tolerance),
             Shape::Specimen(specimen) => specimen.contains(point, tolerance),
             Shape::WithHoles { body, holes } => {
@@ -96,18 +96,12 @@ pub fn crossing(([ax, ay], [bx, by]): Segment, y: f64) -> Option<f64> {
     ((ay > y) != (by > y)).then(|| ax + (y - ay) / (by - ay) * (bx - ax))
 }
 
-/// Even-odd test; a negative tolerance shrinks the polygon. Edges are numbered as the vertices at which they begin; only
-/// those near the point or to the right of it count.
-pub(super) fn polygon_contains(
-    vertices: &[[f64; 2]],
-    edges: impl Iterator<Item = usize>,
-    [x, y]: [f64; 2],
-    tolerance: f64,
-) -> bool {
+/// Even-odd test; a negative tolerance shrinks the polygon.
+fn polygon_contains(vertices: &[[f64; 2]], [x, y]: [f64; 2], tolerance: f64) -> bool {
     let mut inside = false;
     let mut nearest = f64::INFINITY;
-    for k in edges {
-        let (a, b) = (vertices[k], vertices[(k + 1) % vertices.len()]);
+    for (k, &a) in vertices.iter().enumerate() {
+        let b = vertices[(k + 1) % vertices.len()];
         inside ^= crossing((a, b), y).is_some_and(|crossing| x < crossing);
         nearest = nearest.min(segment_distance([x, y], a, b));
     }
@@ -116,7 +110,7 @@ pub(super) fn polygon_contains(
 
 /// Whether a point lies in a polygon, by even and odd.
 pub(crate) fn is_in_polygon(vertices: &[[f64; 2]], point: [f64; 2]) -> bool {
-    polygon_contains(vertices, 0..vertices.len(), point, 0.0)
+    polygon_contains(vertices, point, 0.0)
 }
 
 /// As [`polygon_contains`], with arcs as they are.

@@ -11,3 +11,8 @@ pub mod design;
 pub mod stability;
 #[cfg(feature = "fem")]
 pub mod trade;
+
+use crate::scene::{Scene, SceneError};
+
+/// Loads the scene with these overrides, after those that the user gave.
+pub type Load<'a> = &'a dyn Fn(&[String]) -> Result<Scene, SceneError>;

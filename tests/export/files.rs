@@ -9,7 +9,7 @@ use base64::engine::general_purpose::STANDARD;
 use flockform::continuum::record::{ProbeSeries, Snapshot};
 use flockform::continuum::run::{Outcome, run};
 use flockform::export::{
-    Drawing, ExportError, OutputFolder, Results, Timings, VtkSeries, figures, write_all,
+    Drawing, ExportError, OutputFolder, Records, Results, Timings, VtkSeries, figures, write_all,
 };
 use flockform::flock::role::Role;
 use flockform::scene::Scene;
@@ -24,24 +24,23 @@ use crate::scenes::{load, planned};
 pub struct Run {
     scene: Scene,
     outcome: Outcome,
-    snapshots: Vec<Snapshot>,
-    probes: Vec<ProbeSeries>,
+    records: Records,
 }
 
 impl Run {
     pub fn of(name: &str, overrides: &[&str]) -> Self {
         let scene = load(name, overrides);
         let plan = planned(&scene);
-        let mut probes: Vec<_> = plan.probes.iter().map(|&p| ProbeSeries::new(p)).collect();
-        let mut snapshots = Vec::new();
+        let probes = plan.probes.iter().map(|&p| ProbeSeries::new(p)).collect();
+        let mut records = Records { probes, ..Records::default() };
         let outcome = run(plan, &mut |engine, _| {
-            probes.iter_mut().for_each(|probe| probe.record(engine));
+            records.probes.iter_mut().for_each(|probe| probe.record(engine));
             if scene.record.figures.contains(&engine.step()) {
-                snapshots.push(Snapshot::of(engine));
+                records.snapshots.push(Snapshot::of(engine));
             }
             ControlFlow::Continue(())
         });
-        Self { scene, outcome, snapshots, probes }
+        Self { scene, outcome, records }
     }
 
     fn subject(&self) -> figures::Subject<'_> {
@@ -59,10 +58,7 @@ impl Run {
         let results = Results {
             scene: &self.scene,
             outcome: &self.outcome,
-            snapshots: &self.snapshots,
-            drawn: &[],
-            probes: &self.probes,
-            load_steps: &[],
+            records: &self.records,
             timings: Timings::default(),
         };
         let (written, _) = write_all(folder, &results, Drawing::default())?;
@@ -367,7 +363,7 @@ fn groups<'a, 'input>(
 #[test]
 fn a_configuration_shows_every_particle_in_the_colour_of_its_role() {
     let run = Run::of("tension", &["stop.steps=20", "record.figures=[20]", "title=\"a < b\""]);
-    let svg = figures::configuration(&run.subject(), &run.snapshots[0]);
+    let svg = figures::configuration(&run.subject(), &run.records.snapshots[0]);
     let figure = Document::parse(&svg).expect("well-formed");
     for (role, count) in [("leader", 10), ("clamped", 10), ("follower", 80), ("frame", 44), ("ghost", 0)] {
         // Those that do not follow are told by their shape too, without their colour.
@@ -383,10 +379,10 @@ fn a_configuration_shows_every_particle_in_the_colour_of_its_role() {
     assert!(!texts.contains(&"ghost"), "only roles that are present are in the legend");
     assert_eq!(groups(&figure, "broken").count(), 0);
     let torn = Run::of("notched-plate", &["stop.steps=20", "record.figures=[20]"]);
-    let svg = figures::configuration(&torn.subject(), &torn.snapshots[0]);
+    let svg = figures::configuration(&torn.subject(), &torn.records.snapshots[0]);
     let figure = Document::parse(&svg).expect("well-formed");
     let cuts = groups(&figure, "broken").next().expect("cuts are drawn").attribute("d").expect("a path");
-    assert!(cuts.matches('M').count() >= torn.snapshots[0].broken.len());
+    assert!(cuts.matches('M').count() >= torn.records.snapshots[0].broken.len());
 }
 
 /// Horizontal extent of a path of absolute points.
@@ -407,7 +403,7 @@ fn band_paths(svg: &str) -> Vec<String> {
 fn the_bands_of_a_linear_field_begin_where_it_reaches_their_levels() {
     for lattice in ["square", "centred-rectangular", "hexagonal", "oblique", "honeycomb"] {
         let run = Run::of(&format!("lattice-{lattice}"), &["stop.steps=1", "record.figures=[0]"]);
-        let mut snapshot = run.snapshots[0].clone();
+        let mut snapshot = run.records.snapshots[0].clone();
         snapshot.pe1 = snapshot.positions.x.iter().map(|x| x + 100.0).collect();
         let paths = band_paths(&figures::pe1(&run.subject(), &snapshot));
         let lefts: Vec<f64> = paths.iter().map(|path| extent(path)[0]).collect();
@@ -426,10 +422,10 @@ fn the_bands_of_a_linear_field_begin_where_it_reaches_their_levels() {
 #[test]
 fn a_field_of_zeros_and_a_body_without_lattice_are_drawn() {
     let run = Run::of("drop", &["stop.steps=5", "record.figures=[0, 5]"]);
-    let svg = figures::pe1(&run.subject(), &run.snapshots[1]);
+    let svg = figures::pe1(&run.subject(), &run.records.snapshots[1]);
     assert_eq!(svg.matches("<circle").count(), run.outcome.engine.roles().len());
     let run = Run::of("tension", &["stop.steps=1", "record.figures=[0]"]);
-    let svg = figures::pe1(&run.subject(), &run.snapshots[0]);
+    let svg = figures::pe1(&run.subject(), &run.records.snapshots[0]);
     let bands = band_paths(&svg);
     assert_eq!(bands.len(), 1);
     assert!(!svg.contains("NaN") && !svg.contains("inf"));
@@ -438,11 +434,11 @@ fn a_field_of_zeros_and_a_body_without_lattice_are_drawn() {
 #[test]
 fn contours_leave_the_crack_out() {
     let run = Run::of("notched-plate", &["stop.steps=1", "record.figures=[0]"]);
-    let mut whole = run.snapshots[0].clone();
+    let mut whole = run.records.snapshots[0].clone();
     whole.broken.clear();
     let faces =
         |snapshot: &Snapshot| band_paths(&figures::pe1(&run.subject(), snapshot))[0].matches('Z').count();
-    assert!(faces(&run.snapshots[0]) + 10 < faces(&whole));
+    assert!(faces(&run.records.snapshots[0]) + 10 < faces(&whole));
 }
 
 #[test]
@@ -455,8 +451,8 @@ fn a_body_of_very_many_particles_makes_a_small_figure() {
     ];
     let run = Run::of("tension", &overrides);
     for svg in [
-        figures::configuration(&run.subject(), &run.snapshots[0]),
-        figures::pe1(&run.subject(), &run.snapshots[0]),
+        figures::configuration(&run.subject(), &run.records.snapshots[0]),
+        figures::pe1(&run.subject(), &run.records.snapshots[0]),
     ] {
         assert!(svg.len() < 200_000, "{} bytes", svg.len());
         assert!(svg.contains("particles drawn as squares"));
@@ -470,7 +466,7 @@ fn probes_are_drawn_as_one_line_each_in_the_panels_where_something_happens() {
     for (pull, panels) in [("[0.6, 0.0]", 3), ("[0.6, 0.1]", 4)] {
         let pull = format!("roles[1].motion.per_step={pull}");
         let run = Run::of("tension", &["stop.steps=50", "record.figures=[]", &pull]);
-        let svg = figures::probes(&run.subject(), &run.probes);
+        let svg = figures::probes(&run.subject(), &run.records.probes);
         let figure = Document::parse(&svg).expect("well-formed");
         assert_eq!(groups(&figure, "series").count(), 2 * panels);
         let labels = |id: &str| figure.descendants().filter(|node| node.text() == Some(id)).count();
@@ -484,7 +480,7 @@ fn probes_are_drawn_as_one_line_each_in_the_panels_where_something_happens() {
 fn the_png_is_the_svg_at_twice_its_size_with_its_text() {
     let parent = temporary();
     let run = Run::of("tension", &["stop.steps=1", "record.figures=[1]"]);
-    let svg = figures::configuration(&run.subject(), &run.snapshots[0]);
+    let svg = figures::configuration(&run.subject(), &run.records.snapshots[0]);
     let folder = OutputFolder::create(&parent.path().join("out"), false).expect("created");
     let written = figures::write(&svg, &folder, "configuration_0001").expect("written");
     let [svg_path, png_path] = &written[..] else { panic!("{written:?}") };

@@ -1,5 +1,6 @@
 //! Checkpoints whose checksum is right and whose contents are anything.
 
+use std::borrow::Cow;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Duration;
@@ -10,6 +11,7 @@ use flockform::continuum::run::run_shared;
 use flockform::engine::Engine;
 use flockform::engine::observer::EachStep;
 use flockform::engine::state::EngineState;
+use flockform::export::Records;
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
 use flockform::ranks::Team;
 use flockform::scene::Scene;
@@ -33,8 +35,9 @@ fn good(folder: &Path) -> Vec<u8> {
         probe.record(&engine);
     }
     let asked = RunRequest { scene: "tension".into(), set: Vec::new(), force: false };
-    let (snapshots, probes) = ([Snapshot::of(&engine)], [probe]);
-    let kept = (&snapshots[..], &[][..], &probes[..], &[][..], None);
+    let records =
+        Records { snapshots: vec![Snapshot::of(&engine)], probes: vec![probe], ..Records::default() };
+    let kept = (Cow::Owned(records), None);
     let state = (EngineState::of(&engine), 0.5);
     Checkpoint::new((&asked, &scene, sum), state, kept, Duration::ZERO).write(folder).expect("written");
     std::fs::read(folder.join(checkpoint::FILE)).expect("there")

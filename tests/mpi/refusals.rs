@@ -1,5 +1,6 @@
 //! What ranks refuse, each once and by name.
 
+use std::borrow::Cow;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -83,7 +84,7 @@ fn killed(folder: &Path, out: &'static str, steps: usize) -> [&'static str; 3] {
     (0..steps).for_each(|_| engine.advance());
     let asked = RunRequest { scene: "tension".into(), set: Vec::new(), force: false };
     let state = (EngineState::of(&engine), f64::INFINITY);
-    let left = Checkpoint::new((&asked, &scene, sum), state, (&[], &[], &[], &[], None), Duration::ZERO);
+    let left = Checkpoint::new((&asked, &scene, sum), state, (Cow::default(), None), Duration::ZERO);
     let folder = folder.join(out);
     std::fs::create_dir(&folder).expect("a folder");
     left.write(&folder).expect("written");

@@ -1,5 +1,6 @@
 //! What the ranks of a body in parts write together is what a run alone writes.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -18,7 +19,7 @@ use flockform::engine::state::EngineState;
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
 use flockform::export::figures::Formats;
 use flockform::export::{
-    Drawing, ExportError, OutputFolder, Results, Timings, VtkSeries, write_all, write_piece,
+    Drawing, ExportError, OutputFolder, Records, Results, Timings, VtkSeries, write_all, write_piece,
 };
 use flockform::ranks::Team;
 use flockform::scene::{LoadSteps, Scene};
@@ -36,7 +37,7 @@ struct Writer<'a> {
     /// Of the rank that writes.
     folder: Option<&'a OutputFolder>,
     frames: Option<VtkSeries>,
-    rows: Vec<LoadStep>,
+    records: Records,
     leave_at: Option<usize>,
 }
 
@@ -51,7 +52,7 @@ impl Writer<'_> {
 
     fn measure(&mut self, engine: &Engine) {
         if self.scene.load_steps.is_some() {
-            self.rows.extend(LoadStep::of(engine));
+            self.records.load_steps.extend(LoadStep::of(engine));
         }
     }
 
@@ -59,8 +60,8 @@ impl Writer<'_> {
         let asked = RunRequest { scene: "plate".into(), set: Vec::new(), force: false };
         let made = || {
             let state = (EngineState::of(engine), residual);
-            let recorded = (&[][..], &[][..], &[][..], &self.rows[..], None);
-            Checkpoint::new((&asked, self.scene, self.digest), state, recorded, Duration::default())
+            let records = (Cow::Borrowed(&self.records), None);
+            Checkpoint::new((&asked, self.scene, self.digest), state, records, Duration::default())
         };
         let folder = self.folder.map(OutputFolder::folder);
         let Some(team) = self.team else {
@@ -113,22 +114,20 @@ fn write(scene: &Scene, team: Option<&Team>, out: &Path, from: Option<&Path>, le
         left.join(from, &plan.setup).expect("of this body");
         left
     });
-    let rows = left.iter().flat_map(|left| left.load_steps.to_vec()).collect();
+    let records = left.as_ref().map_or_else(Records::default, |left| left.records.clone().into_owned());
     let from = left.map(|left| (left.engine, left.residual));
     let is_writing = team.is_none_or(Team::is_first);
     let folder = is_writing.then(|| OutputFolder::create(out, true).expect("created"));
     let frames = folder.as_ref().filter(|_| scene.record.vtk_every > 0);
     let frames = frames.map(|folder| VtkSeries::create(folder).expect("created"));
     let folder_of = folder.as_ref();
-    let mut writer = Writer { scene, team, digest, folder: folder_of, frames, rows, leave_at };
+    let mut writer = Writer { scene, team, digest, folder: folder_of, frames, records, leave_at };
     let outcome = run_to_equilibrium_shared(scene, plan, from, team, &mut writer).expect("can be shared");
-    if writer.rows.last().is_some_and(|last| last.step != outcome.engine.step()) {
+    if writer.records.load_steps.last().is_some_and(|last| last.step != outcome.engine.step()) {
         writer.measure(&outcome.engine);
     }
-    let load_steps = &writer.rows[..];
     let timings = Timings::default();
-    let (outcome, snapshots, drawn, probes) = (&outcome, &[], &[], &[]);
-    let results = Results { scene, outcome, snapshots, drawn, probes, load_steps, timings };
+    let results = Results { scene, outcome: &outcome, records: &writer.records, timings };
     let drawing = Drawing { formats: Formats::None, ..Drawing::default() };
     write_all(folder_of, &results, drawing).expect("written");
     if let Some(frames) = writer.frames {

@@ -67,6 +67,11 @@ impl Grid {
             bytes: sides * halo * self.rows as f64 * PLACE / together as f64,
         }
     }
+
+    /// So many times as many columns.
+    pub fn longer(&self, times: usize) -> Self {
+        Self { columns: self.columns * times, ..*self }
+    }
 }
 
 /// The time that loads take.
@@ -94,13 +99,6 @@ impl Model {
     /// As much of a body for each rank as `grid` \[1\].
     pub fn weak_efficiency(&self, grid: &Grid, ranks: usize) -> f64 {
         self.seconds(&grid.load(1)) / self.seconds(&grid.longer(ranks).load(ranks))
-    }
-}
-
-impl Grid {
-    /// So many times as many columns.
-    pub fn longer(&self, times: usize) -> Self {
-        Self { columns: self.columns * times, ..*self }
     }
 }
 

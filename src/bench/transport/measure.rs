@@ -302,6 +302,7 @@ mod tests {
         let times = Quantiles::of((1..=2000).rev().map(f64::from).collect());
         assert_eq!((times.p50_seconds, times.p90_seconds), (Some(1000.0), Some(1800.0)));
         assert_eq!((times.p99_seconds, times.p999_seconds), (Some(1980.0), Some(1998.0)));
+        assert_eq!(Quantiles::of(vec![1.0]).p99_seconds, Some(1.0));
         assert_eq!(Quantiles::of(Vec::new()).p50_seconds, None);
     }
 

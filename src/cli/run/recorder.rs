@@ -11,7 +11,7 @@ use flockform::export::figures::is_raster;
 use flockform::export::memory::Outputs;
 use flockform::export::report::view::View;
 use flockform::export::report::{AnimationState, RunRecorder};
-use flockform::export::{Drawn, ExportError, OutputFolder, VtkSeries, probes_of_parts, write_piece};
+use flockform::export::{Drawn, ExportError, OutputFolder, Records, VtkSeries, probes_of_parts, write_piece};
 use flockform::ranks::Team;
 use flockform::scene::{LoadSteps, Scene};
 
@@ -20,13 +20,9 @@ use crate::cli::checkpoint::{Recorded, ResumedRun};
 /// Keeps what the scene asks for while the run goes on.
 pub struct Recorder<'a> {
     scene: &'a Scene,
-    snapshots: Vec<Snapshot>,
-    /// Figures of bodies of which no snapshots are kept.
-    drawn: Vec<Drawn>,
-    probes: Vec<ProbeSeries>,
+    records: Records,
     /// Indices of the probed particles in the whole body.
     probed: Vec<usize>,
-    load_steps: Vec<LoadStep>,
     /// Of the rank that writes.
     frames: Option<VtkSeries>,
     outputs: Outputs,
@@ -38,12 +34,9 @@ pub struct Recorder<'a> {
     pub writing: Duration,
 }
 
-/// The records of a run, and the time spent writing them.
-pub struct Records {
-    pub snapshots: Vec<Snapshot>,
-    pub drawn: Vec<Drawn>,
-    pub probes: Vec<ProbeSeries>,
-    pub load_steps: Vec<LoadStep>,
+/// All that was recorded of a run, and the time spent writing it.
+pub struct Finished {
+    pub records: Records,
     /// The view of the report.
     pub stage: Option<View>,
     /// For a film.
@@ -62,7 +55,9 @@ impl<'a> Recorder<'a> {
         // A body that is not stepped has no history.
         let is_solved_at_once = scene.is_solved_at_once();
         let probed = if is_solved_at_once { Vec::new() } else { plan.probes.clone() };
-        let new_probes = || probed.iter().map(|&particle| ProbeSeries::new(particle)).collect();
+        let probes = || probed.iter().map(|&particle| ProbeSeries::new(particle)).collect();
+        let new = || Records { probes: probes(), ..Records::default() };
+        let records = left.map_or_else(new, |left| left.checkpoint.records.clone().into_owned());
         let every = scene.record.vtk_every;
         let frames = folder.filter(|_| every > 0).map(|folder| match left {
             None => VtkSeries::create(folder),
@@ -71,11 +66,8 @@ impl<'a> Recorder<'a> {
         let frames = frames.transpose()?;
         Ok(Self {
             scene,
-            snapshots: left.map_or_else(Vec::new, |left| left.checkpoint.snapshots.to_vec()),
-            drawn: left.map_or_else(Vec::new, |left| left.checkpoint.drawn.to_vec()),
-            probes: left.map_or_else(new_probes, |left| left.checkpoint.probes.to_vec()),
+            records,
             probed,
-            load_steps: left.map_or_else(Vec::new, |left| left.checkpoint.load_steps.to_vec()),
             frames,
             outputs,
             animation: None,
@@ -92,20 +84,13 @@ impl<'a> Recorder<'a> {
             // A run that was just resumed has not yet looked at a step, and still has the frames of before.
             self.open_animation(engine);
         }
-        Recorded {
-            snapshots: &self.snapshots,
-            drawn: &self.drawn,
-            probes: &self.probes,
-            load_steps: &self.load_steps,
-            animation: self.animation.as_ref(),
-            frames: self.frames.as_mut(),
-        }
+        Recorded { records: &self.records, animation: self.animation.as_ref(), frames: self.frames.as_mut() }
     }
 
     pub fn step(&mut self, engine: &Engine) {
         // Of a part the engine records them itself.
         if engine.parted().is_none() {
-            self.probes.iter_mut().for_each(|probe| probe.record(engine));
+            self.records.probes.iter_mut().for_each(|probe| probe.record(engine));
         }
         if self.scene.record.figures.contains(&engine.step()) {
             self.draw(engine);
@@ -149,16 +134,16 @@ impl<'a> Recorder<'a> {
             return;
         }
         if !is_raster(engine.body().total()) {
-            self.snapshots.push(Snapshot::of(engine));
+            self.records.snapshots.push(Snapshot::of(engine));
             return;
         }
         let start = Instant::now();
-        self.drawn.extend(Drawn::of(self.scene, engine));
+        self.records.drawn.extend(Drawn::of(self.scene, engine));
         self.writing += start.elapsed();
     }
 
     fn measure(&mut self, engine: &Engine) {
-        self.load_steps.extend(LoadStep::of(engine));
+        self.records.load_steps.extend(LoadStep::of(engine));
     }
 
     /// Whether there is a frame for ParaView of a step on the way.
@@ -181,7 +166,7 @@ impl<'a> Recorder<'a> {
     /// The histories of the probed particles of all parts.
     fn receive_probes(&mut self, engine: &Engine) {
         if let Some(team) = engine.parted() {
-            self.probes = probes_of_parts(engine, &self.probed, team);
+            self.records.probes = probes_of_parts(engine, &self.probed, team);
         }
     }
 
@@ -190,17 +175,19 @@ impl<'a> Recorder<'a> {
     }
 
     /// The last configuration is drawn wherever any is, and for ParaView always written.
-    pub fn finish(mut self, outcome: &Outcome) -> Result<Records, ExportError> {
+    pub fn finish(mut self, outcome: &Outcome) -> Result<Finished, ExportError> {
         let engine = &outcome.engine;
         let (step, every) = (engine.step(), self.scene.record.vtk_every);
         self.receive_probes(engine);
-        let last = self.snapshots.last().map(|last| last.step).or(self.drawn.last().map(|last| last.step));
+        let Records { snapshots, drawn, load_steps, .. } = &self.records;
+        let last = snapshots.last().map(|last| last.step).or(drawn.last().map(|last| last.step));
+        let is_measured = load_steps.last().is_some_and(|last| last.step == step);
         // Figures of a run that is broken off are not written, and those of a large body take their time.
         let is_in_vain = outcome.reason == StopReason::Interrupted && is_raster(engine.body().total());
         if last != Some(step) && !is_in_vain {
             self.draw(engine);
         }
-        if load_every(self.scene).is_some() && self.load_steps.last().is_none_or(|last| last.step != step) {
+        if load_every(self.scene).is_some() && !is_measured {
             self.measure(engine);
         }
         if every > 0 && !self.is_frame(step) && !engine.any_of_parts(self.failed()) {
@@ -223,11 +210,10 @@ impl<'a> Recorder<'a> {
         let animation = self.animation.as_mut().filter(|_| is_written);
         let stage = animation.map(|animation| animation.stage(self.scene, outcome));
         let writing = self.writing + start.elapsed();
-        let Self { snapshots, drawn, probes, load_steps, animation, outputs, failure, .. } = self;
-        let animation = animation.filter(|_| outputs.film);
+        let animation = self.animation.filter(|_| self.outputs.film);
         // The others take the last frame of the report together with a rank that could not write its own.
-        let records = Records { snapshots, drawn, probes, load_steps, stage, animation, writing };
-        failure.map_or(Ok(records), Err)
+        let finished = Finished { records: self.records, stage, animation, writing };
+        self.failure.map_or(Ok(finished), Err)
     }
 }
 

@@ -11,16 +11,16 @@ use flockform::continuum::equilibrium::run_to_equilibrium_watched;
 use flockform::continuum::run::StopReason;
 use flockform::engine::Engine;
 use flockform::engine::observer::Observer;
-use flockform::export::sweep::{Journal, Output, OutputError, Probed, Row, Values};
+use flockform::export::sweep::{Journal, Output, Probed, Row, SweepError, Values};
 use flockform::export::{ExportError, Measured, Summary, Timings};
 use flockform::scene::{Scene, SceneError};
-use flockform::solve::interrupt::Interrupt;
 use flockform::study::compare::run::plan;
 use flockform::study::design::Design;
-use flockform::study::trade::{Chosen, choose};
+use flockform::study::trade::choose;
 
 use super::super::names::SceneArguments;
 use super::super::progress::Progress;
+use super::super::run::interruptible;
 use super::super::{Refusal, interrupt};
 
 /// How a run ended that could not begin.
@@ -50,7 +50,7 @@ pub struct Runs<'a> {
 /// A run that has ended, and its outputs.
 struct Ended {
     stop_reason: StopReason,
-    outputs: Vec<Result<String, OutputError>>,
+    outputs: Vec<Result<String, SweepError>>,
     cautions: Vec<String>,
 }
 
@@ -61,7 +61,7 @@ impl Ended {
     }
 
     /// The first output that such a run does not have.
-    fn misspelt(&self) -> Option<&OutputError> {
+    fn misspelt(&self) -> Option<&SweepError> {
         self.outputs.iter().find_map(|output| output.as_ref().err()).filter(|_| self.is_sound())
     }
 }
@@ -160,10 +160,7 @@ impl Runs<'_> {
         let start = Instant::now();
         let overrides = self.design.overrides(run);
         let load = |more: &[String]| self.scene.load_scene(&[&overrides, more].concat());
-        let Chosen { mut scene, .. } = choose(load(&[])?, &load)?;
-        if let Some(equilibrium) = &mut scene.equilibrium {
-            equilibrium.request.interrupt = Interrupt::new(interrupt::flag());
-        }
+        let scene = interruptible(choose(load(&[])?, &load)?.scene);
         let plan = plan(&scene)?;
         let between = (UPDATES_BETWEEN_LOOKS / plan.count().max(1)).max(1);
         let mut observer = Look { outputs: self.outputs, probed: Probed::default(), between };
@@ -186,7 +183,7 @@ impl Runs<'_> {
             Ok(Ended { stop_reason: StopReason::Interrupted, .. }) => None,
             Ok(Ended { stop_reason, outputs, mut cautions }) => {
                 let missing =
-                    outputs.iter().filter_map(|output| output.as_ref().err()).map(OutputError::to_string);
+                    outputs.iter().filter_map(|output| output.as_ref().err()).map(SweepError::to_string);
                 cautions.extend(missing.map(|error| error.lines().next().unwrap_or_default().to_owned()));
                 let outputs = outputs.into_iter().map(Result::unwrap_or_default).collect();
                 row(stop_reason.name(), outputs, stop_reason.fault().unwrap_or_default(), cautions)

@@ -24,58 +24,30 @@ pub enum CheckpointError {
         /// The error of the system.
         source: std::io::Error,
     },
-    /// The file does not begin as a checkpoint does.
-    #[error("{} is no checkpoint of flockform\n  help: give the folder of a run; remove the file to start again", .path.display())]
-    NotOne {
-        /// Path of the checkpoint.
-        path: PathBuf,
-    },
-    /// The file ends before its payload does.
-    #[error(
-        "{} is truncated: it has {found} bytes of {needed}\n  help: restore it from a copy, or remove it and start the run again",
-        .path.display()
-    )]
-    Truncated {
-        /// Path of the checkpoint.
-        path: PathBuf,
-        /// Its size \[byte\].
-        found: u64,
-        /// The size that its header asks for \[byte\].
-        needed: u64,
-    },
-    /// The payload is not what was written.
-    #[error(
-        "{} is corrupted: {what}\n  help: restore it from a copy, or remove it and start the run again",
-        .path.display()
-    )]
-    Corrupted {
-        /// Path of the checkpoint.
+    /// The file cannot be gone on with: it is damaged, or of something else.
+    #[error("{} {what}\n  help: {help}", .path.display())]
+    Unfit {
+        /// The file or its folder.
         path: PathBuf,
         /// The fault in it.
         what: String,
+        /// The way out.
+        help: &'static str,
     },
-    /// Another version of the layout or of the program wrote the file.
-    #[error(
-        "{} is of {found}, this is {known}: the same bits cannot be promised\n  help: resume with the program that wrote it, or remove it and start the run again",
-        .path.display()
-    )]
-    Version {
-        /// Path of the checkpoint.
-        path: PathBuf,
-        /// The version that wrote it.
-        found: String,
-        /// The version that reads it.
-        known: String,
-    },
-    /// The checkpoint is of another scene, or files that the scene names have changed.
-    #[error(
-        "{} belongs to another scene: {what}\n  help: resume with the scene that was run, or start this one with another --out",
-        .path.display()
-    )]
-    Foreign {
-        /// The file or its folder.
-        path: PathBuf,
-        /// The difference.
-        what: String,
-    },
+}
+
+/// The way out where a checkpoint is damaged.
+pub(super) const RESTORE: &str = "restore it from a copy, or remove it and start the run again";
+
+impl CheckpointError {
+    /// A payload that is not what was written.
+    pub(super) fn corrupted(path: PathBuf, what: &str) -> Self {
+        Self::Unfit { path, what: format!("is corrupted: {what}"), help: RESTORE }
+    }
+
+    /// A checkpoint of another scene, or one whose files have changed.
+    pub fn foreign(path: PathBuf, what: &str) -> Self {
+        let help = "resume with the scene that was run, or start this one with another --out";
+        Self::Unfit { path, what: format!("belongs to another scene: {what}"), help }
+    }
 }

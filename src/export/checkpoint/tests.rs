@@ -1,6 +1,7 @@
 use super::*;
 use crate::continuum::digest::digest;
 use crate::continuum::plan::Plan;
+use crate::continuum::record::{ProbeSeries, Snapshot};
 use crate::engine::Engine;
 use crate::scene::bundled;
 
@@ -21,11 +22,12 @@ fn written(folder: &Path) -> (EngineState<'static>, Vec<u8>) {
     }
     let asked = RunRequest { scene: "tension".into(), set: vec!["a.b=1".into()], force: false };
     let state = EngineState::of(&engine);
-    let (snapshots, probes) = ([Snapshot::of(&engine)], [probe]);
+    let records =
+        Records { snapshots: vec![Snapshot::of(&engine)], probes: vec![probe], ..Records::default() };
     let checkpoint = Checkpoint::new(
         (&asked, &scene, sum),
         (state.clone(), f64::INFINITY),
-        (&snapshots, &[], &probes, &[], None),
+        (Cow::Borrowed(&records), None),
         Duration::from_millis(1500),
     );
     checkpoint.write(folder).expect("written");
@@ -45,8 +47,8 @@ fn a_checkpoint_is_read_back_to_the_bit() {
     assert_eq!(other.fingerprint(), read.fingerprint());
     other.residual = 1.0;
     assert_ne!(other.fingerprint(), read.fingerprint());
-    assert_eq!((read.snapshots.len(), read.probes[0].pe1.len()), (1, 25));
-    assert_eq!(read.snapshots[0].step, 25);
+    assert_eq!((read.records.snapshots.len(), read.records.probes[0].pe1.len()), (1, 25));
+    assert_eq!(read.records.snapshots[0].step, 25);
     let left: Vec<_> = fs::read_dir(folder.path()).expect("readable").flatten().collect();
     assert_eq!(left.len(), 1, "{left:?}");
 }
@@ -58,7 +60,7 @@ fn every_truncation_and_every_flipped_bit_is_refused() {
     let path = folder.path().join(FILE);
     for length in (0..bytes.len()).step_by(97).chain(0..40) {
         let error = Checkpoint::of_bytes(&path, &bytes[..length]).expect_err("truncated");
-        assert!(matches!(error, CheckpointError::Truncated { .. }), "{length}: {error}");
+        assert!(error.to_string().contains("is truncated: it has"), "{length}: {error}");
     }
     for at in (0..bytes.len()).step_by(61).chain(0..40) {
         let mut bytes = bytes.clone();

@@ -177,11 +177,7 @@ mod tests {
             for &[x, y] in &part {
                 assert!(2.0 * x + y >= 2.0 - 1e-12, "[{x}, {y}]");
             }
-            let cross = |n: usize| {
-                let (a, b) = (part[n], part[(n + 1) % part.len()]);
-                (a[0] * b[1] - a[1] * b[0]) / 2.0
-            };
-            area += (0..part.len()).map(cross).sum::<f64>();
+            area += crate::geometry::point::area(&part);
         }
         // 2x + y >= 2 within the unit square is the triangle (1, 0), (1, 1), (1/2, 1).
         assert!((area - 0.25).abs() < 1e-12, "{area}");

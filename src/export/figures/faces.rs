@@ -34,16 +34,11 @@ mod tests {
     use crate::flock::body::Cut;
     use crate::flock::lattice::{Lattice, LatticeKind};
     use crate::flock::neighbourhood::Neighbourhood;
+    use crate::geometry::point::area;
 
     fn block(kind: LatticeKind, neighbourhood: Neighbourhood) -> Body {
         let lattice = Lattice::new(kind, [0.0; 2], 0.4);
         Body::build(lattice, &Cut::Count { columns: 7, rows: 7 }, &neighbourhood, None).expect("a body").0
-    }
-
-    fn area(body: &Body, face: &[u32]) -> f64 {
-        let at = |n: usize| body.reference.get(face[n % face.len()] as usize);
-        let cross = |a: [f64; 2], b: [f64; 2]| a[0] * b[1] - a[1] * b[0];
-        (0..face.len()).map(|n| cross(at(n), at(n + 1)) / 2.0).sum()
     }
 
     #[test]
@@ -67,7 +62,9 @@ mod tests {
             assert!(found.len() > 4, "{kind:?}");
             for face in found {
                 assert_eq!(face.len(), corners, "{kind:?}");
-                assert!((area(&body, &face) - share * body.lattice.cell_area()).abs() < 1e-9, "{kind:?}");
+                let corners: Vec<_> =
+                    face.iter().map(|&corner| body.reference.get(corner as usize)).collect();
+                assert!((area(&corners) - share * body.lattice.cell_area()).abs() < 1e-9, "{kind:?}");
             }
         }
     }

@@ -141,11 +141,6 @@ pub const PNG_ZOOM: f32 = 2.0;
 /// More particles than this are drawn as a raster: an SVG of a million circles opens nowhere.
 const MOST_DOTS: usize = 60_000;
 
-/// A figure as PNG, `width` pixels wide; the error is a reason.
-pub(super) fn render(svg: &str, width: f32) -> Result<Vec<u8>, String> {
-    png::render(svg, |sheet| width / sheet)
-}
-
 /// The files of a figure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]

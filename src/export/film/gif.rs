@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use gif::{DisposalMethod, EncodingError, Frame, Repeat};
 
+use super::super::error::ExportError;
 use super::error::FilmError;
 use super::palette::Palette;
 use super::{Encoder, Picture};
@@ -78,7 +79,7 @@ impl Encoder for GifEncoder {
         let path = self.path;
         let mut file = self.encoder.into_inner().map_err(|error| failed(&path, error))?;
         let written = file.flush().and_then(|()| file.get_ref().sync_all());
-        written.map_err(FilmError::io("write", &path))
+        written.map_err(|error| failed(&path, error.into()))
     }
 }
 
@@ -103,5 +104,5 @@ fn failed(path: &Path, error: EncodingError) -> FilmError {
         EncodingError::Io(source) => source,
         other => io::Error::other(other.to_string()),
     };
-    FilmError::io("write", path)(source)
+    ExportError::io("write", path)(source).into()
 }

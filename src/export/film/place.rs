@@ -4,9 +4,10 @@ use std::fs::{self, File, TryLockError};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use super::super::error::ExportError;
 use super::error::FilmError;
 use super::gif::GifEncoder;
-use super::video::{self, VideoEncoder};
+use super::video::{self, Codec, VideoEncoder};
 use super::{Encoder, Picture};
 use crate::export::folder::beside;
 
@@ -32,7 +33,10 @@ impl FilmFormat {
             Some("gif") => Ok(Self::Gif),
             Some("mp4") => Ok(Self::Mp4),
             Some("webm") => Ok(Self::WebM),
-            _ => Err(FilmError::Ending(path.to_owned())),
+            _ => Err(FilmError::Refused(format!(
+                "{} does not say what film it is to be\n  help: end the name with .gif, .mp4 or .webm",
+                path.display()
+            ))),
         }
     }
 
@@ -53,7 +57,7 @@ pub struct FilmFile {
     part: PathBuf,
     format: FilmFormat,
     force: bool,
-    codec: Option<&'static str>,
+    codec: Option<Codec>,
     /// Holds other programs off.
     _lock: File,
 }
@@ -66,10 +70,12 @@ impl FilmFile {
     /// written to; a video without `ffmpeg`; another program that makes the same film.
     pub fn create(path: &Path, force: bool) -> Result<Self, FilmError> {
         let format = FilmFormat::of(path)?;
-        let path = std::path::absolute(path).map_err(FilmError::io("find", path))?;
+        let path = std::path::absolute(path).map_err(ExportError::io("find", path))?;
         require_free(&path, format, force)?;
         if let Some(folder) = path.parent().filter(|folder| !folder.is_dir()) {
-            return Err(FilmError::NoFolder(folder.to_owned()));
+            let help = "make it, or give --film another place";
+            let fault = format!("there is no folder {} for the film\n  help: {help}", folder.display());
+            return Err(FilmError::Refused(fault));
         }
         let codec = match format {
             FilmFormat::Gif => None,
@@ -81,9 +87,10 @@ impl FilmFile {
             return Err(FilmError::Taken(part));
         }
         let lock = File::options().write(true).create(true).truncate(false).open(&part);
-        let lock = lock.map_err(FilmError::io("create", &part))?;
+        let lock = lock.map_err(ExportError::io("create", &part))?;
         if let Err(TryLockError::WouldBlock) = lock.try_lock() {
-            return Err(FilmError::Busy(path));
+            let fault = "is being made by another flockform that still runs: give --film another name";
+            return Err(FilmError::Refused(format!("{} {fault}", path.display())));
         }
         Ok(Self { path, part, format, force, codec, _lock: lock })
     }
@@ -114,7 +121,7 @@ impl FilmFile {
     }
 
     pub(super) fn encoder_name(&self) -> String {
-        self.codec.map_or_else(|| "GIF, by flockform itself".into(), |codec| format!("{codec}, by ffmpeg"))
+        self.codec.map_or_else(|| "GIF, by flockform itself".into(), |(name, _)| format!("{name}, by ffmpeg"))
     }
 
     /// Gives the film its name.
@@ -122,7 +129,7 @@ impl FilmFile {
         // Asked again: another program may have written there meanwhile.
         require_free(&self.path, self.format, self.force)?;
         fs::rename(&self.part, &self.path)
-            .map_err(FilmError::io("rename the finished film to", &self.path))?;
+            .map_err(ExportError::io("rename the finished film to", &self.path))?;
         Ok(self.path.clone())
     }
 }

@@ -37,9 +37,8 @@ pub fn require_colour(scene: &Scene, colour: FilmColour) -> Result<(), FilmError
         FilmColour::Away | FilmColour::Speed | FilmColour::Acceleration => "it is a quantity of robots",
         _ => return Ok(()),
     };
-    let colour = colour.name();
-    let choices = "role, displacement, pe1 or strain; pe2 needs a stepped run, von-mises a material";
-    Err(FilmError::Colour { colour, reason, choices })
+    let help = "choose role, displacement, pe1 or strain; pe2 needs a stepped run, von-mises a material";
+    Err(FilmError::Refused(format!("--film-colour {}: {reason}\n  help: {help}", colour.name())))
 }
 
 /// The film of a run whose recorder is finished.
@@ -188,11 +187,6 @@ impl<'a> Shown<'a> {
     fn values(&self, frame: usize) -> Option<Vec<f64>> {
         let kept = |quantity| self.recorder.values(frame, quantity);
         Some(match self.colour {
-            FilmColour::Role
-            | FilmColour::Clearance
-            | FilmColour::Away
-            | FilmColour::Speed
-            | FilmColour::Acceleration => return None,
             FilmColour::Displacement => self.displacement(frame).iter().map(|[x, y]| x.hypot(y)).collect(),
             FilmColour::Pe2 => kept(PE2)?,
             FilmColour::Pe1 => kept(PE1).unwrap_or_else(|| {
@@ -207,6 +201,8 @@ impl<'a> Shown<'a> {
                 })
             }),
             FilmColour::VonMises => kept(VON_MISES).unwrap_or_else(|| self.stress(frame)),
+            // Of roles, and of what robots alone have.
+            _ => return None,
         })
     }
 
@@ -242,16 +238,12 @@ impl<'a> Shown<'a> {
     fn scale(&self, setting: &Setting) -> Option<Scale<'static>> {
         let (unit, spacing) = (self.scene.unit(), self.engine.body().lattice.spacing());
         let (quantity, unit, noise) = match self.colour {
-            FilmColour::Role
-            | FilmColour::Clearance
-            | FilmColour::Away
-            | FilmColour::Speed
-            | FilmColour::Acceleration => return None,
             FilmColour::Displacement => ("displacement", unit.to_owned(), NOISE * spacing),
             FilmColour::Pe1 => ("PE1", format!("{unit}²"), (NOISE * spacing).powi(2)),
             FilmColour::Pe2 => ("PE2", unit.to_owned(), NOISE * spacing),
             FilmColour::Strain => ("largest strain", String::new(), NOISE),
             FilmColour::VonMises => ("von Mises stress", Units::of(self.scene).stress, 0.0),
+            _ => return None,
         };
         Some(Scale { quantity, unit, bands: setting.bands(noise) })
     }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::thread::JoinHandle;
 
+use super::super::error::ExportError;
 use super::error::FilmError;
 use super::{Encoder, FilmFormat, Picture};
 
@@ -12,8 +13,11 @@ const FFMPEG: &str = "ffmpeg";
 /// Words of a failing program that are passed on at most \[byte\].
 const MOST_WORDS: u64 = 2000;
 
-/// Encoders of a format, the best first, with what each takes beside its name.
-fn codecs(format: FilmFormat) -> &'static [(&'static str, &'static [&'static str])] {
+/// The name of an encoder, and the options that it takes.
+pub type Codec = (&'static str, &'static [&'static str]);
+
+/// Encoders of a format, the best first.
+fn codecs(format: FilmFormat) -> &'static [Codec] {
     match format {
         FilmFormat::Gif => &[],
         FilmFormat::Mp4 => &[
@@ -32,18 +36,21 @@ fn codecs(format: FilmFormat) -> &'static [(&'static str, &'static [&'static str
 ///
 /// # Errors
 /// There is no such program, or it has none.
-pub fn codec(format: FilmFormat, path: &Path) -> Result<&'static str, FilmError> {
-    let refused = |reason: String| FilmError::NoEncoder { path: path.to_owned(), reason };
+pub fn codec(format: FilmFormat, path: &Path) -> Result<Codec, FilmError> {
+    let refused = |reason: &str| {
+        let help = "install ffmpeg, or end the name of the film with .gif";
+        FilmError::Refused(format!("{} takes the program `ffmpeg`: {reason}\n  help: {help}", path.display()))
+    };
     let asked = Command::new(FFMPEG).args(["-hide_banner", "-encoders"]).stdin(Stdio::null()).output();
     let asked = asked.map_err(|error| match error.kind() {
-        ErrorKind::NotFound => refused("it is not on the PATH".into()),
-        _ => refused(format!("it cannot be started ({error})")),
+        ErrorKind::NotFound => refused("it is not on the PATH"),
+        _ => refused(&format!("it cannot be started ({error})")),
     })?;
     let listed = String::from_utf8_lossy(&asked.stdout);
     let has = |name: &str| listed.lines().any(|line| line.split_whitespace().nth(1) == Some(name));
-    let names = || codecs(format).iter().map(|(name, _)| *name);
-    let wanted = || names().collect::<Vec<_>>().join(", ");
-    names().find(|name| has(name)).ok_or_else(|| refused(format!("this one has none of {}", wanted())))
+    let wanted = || codecs(format).iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+    let found = codecs(format).iter().copied().find(|(name, _)| has(name));
+    found.ok_or_else(|| refused(&format!("this one has none of {}", wanted())))
 }
 
 pub struct VideoEncoder {
@@ -59,7 +66,7 @@ impl VideoEncoder {
     /// For frames of one size, each shown for `time` \[s/100\].
     pub fn start(
         format: FilmFormat,
-        codec: &'static str,
+        (codec, options): Codec,
         path: &Path,
         time: u16,
         [width, height]: [u32; 2],
@@ -69,8 +76,6 @@ impl VideoEncoder {
             // The index first, so that a web page can play it while it loads.
             _ => ("mp4", &["-movflags", "+faststart"]),
         };
-        let options =
-            codecs(format).iter().find(|(name, _)| *name == codec).map_or(&[][..], |(_, options)| options);
         let mut command = Command::new(FFMPEG);
         command.args(["-hide_banner", "-loglevel", "error", "-nostdin", "-y"]);
         command.args(["-f", "rawvideo", "-pix_fmt", "rgba", "-video_size", &format!("{width}x{height}")]);
@@ -78,7 +83,7 @@ impl VideoEncoder {
         command.args(options).args(["-pix_fmt", "yuv420p"]).args(more).args(["-f", container]);
         // An absolute path, which no option and no protocol begins with.
         command.arg(path).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
-        let mut child = command.spawn().map_err(FilmError::io("start ffmpeg for", path))?;
+        let mut child = command.spawn().map_err(ExportError::io("start ffmpeg for", path))?;
         let frames = child.stdin.take();
         // Read meanwhile: a program that says much must not wait for a reader.
         let words = child.stderr.take().map(|said| std::thread::spawn(move || words_of(said)));

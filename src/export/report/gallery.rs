@@ -7,7 +7,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
 
 use super::super::error::{ExportError, write_file};
-use super::super::figures;
+use super::super::figures::png;
 use super::super::{OutputFolder, summary};
 use super::page::{FILE, STYLE, escaped, filled};
 
@@ -83,7 +83,8 @@ pub fn write_gallery(folder: &OutputFolder, exhibits: &[Exhibit]) -> Result<Vec<
 fn card(folder: &OutputFolder, exhibit: &Exhibit) -> Result<String, ExportError> {
     let path = picture(&folder.path(exhibit.folder()))?;
     let svg = std::fs::read_to_string(&path).map_err(ExportError::io("read", &path))?;
-    let png = figures::render(&svg, WIDTH).map_err(|reason| ExportError::Figure { path, reason })?;
+    let png = png::render(&svg, |sheet| WIDTH / sheet);
+    let png = png.map_err(|reason| ExportError::Figure { path, reason })?;
     let (title, name, sentence) =
         (escaped(&exhibit.title), escaped(&exhibit.name), escaped(&exhibit.sentence));
     Ok(format!(

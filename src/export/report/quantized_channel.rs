@@ -108,10 +108,6 @@ mod tests {
         codes[particle]
     }
 
-    fn value(track: &QuantizedChannel, particle: usize) -> f64 {
-        track.values()[particle]
-    }
-
     #[test]
     fn a_value_comes_back_within_half_a_quantum_and_the_quantum_fits_the_range() {
         for bits in [12, 16, 24] {
@@ -123,8 +119,8 @@ mod tests {
                     quantum <= (2.0 * (high - low) / f64::from(none(bits) - 2)).max(1e-9),
                     "{bits} {low}"
                 );
-                for (particle, wanted) in values.iter().enumerate() {
-                    let off = (value(&track, particle) - wanted).abs();
+                for (found, wanted) in track.values().iter().zip(&values) {
+                    let off = (found - wanted).abs();
                     assert!(off <= 0.5 * quantum, "{bits}: {wanted} off by {off}");
                 }
             }

@@ -265,8 +265,7 @@ impl RunRecorder {
 
     /// The animation of a run that is closed, for the rank that writes; of frames that are too many for a page half are let go.
     pub fn stage(&mut self, scene: &Scene, outcome: &Outcome) -> View {
-        let (engine, is_solved) = (&outcome.engine, self.is_solved);
-        self.view(scene, engine, is_solved, self.is_exact())
+        self.view(scene, &outcome.engine, self.is_solved, self.is_exact())
     }
 
     /// Whether the page has the final values exactly.

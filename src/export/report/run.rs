@@ -26,9 +26,9 @@ pub fn write(
     stage: View,
 ) -> Result<PathBuf, ExportError> {
     let (scene, outcome) = (results.scene, results.outcome);
-    let mut plots = probes::charts(results.probes, outcome.engine.body(), scene.unit());
+    let mut plots = probes::charts(&results.records.probes, outcome.engine.body(), scene.unit());
     let units = Units::of(scene);
-    plots.extend(load::chart(scene, &units, results.load_steps));
+    plots.extend(load::chart(scene, &units, &results.records.load_steps));
     plots.extend(outcome.solved.as_ref().and_then(|solved| chart::residuals(&solved.residuals)));
     let page = Page {
         title: scene.raw.title.clone(),
@@ -187,7 +187,7 @@ fn facts(scene: &Scene, outcome: &Outcome, summary: &Summary) -> Vec<(String, St
         });
         fact("Broken bonds", format!("{}{first}", broken.count));
     }
-    fact("Time", format!("{:.3} s for the steps", summary.timings.steps_s));
+    fact("Time", format!("{:.3} s for the steps", summary.timings.steps.as_secs_f64()));
     facts
 }
 

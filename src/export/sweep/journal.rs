@@ -1,5 +1,6 @@
 //! The journal of a sweep: what was asked for, and every run that has ended.
 
+use std::fmt::Display;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -89,7 +90,7 @@ impl JournalHeader {
         } else {
             return Ok(());
         };
-        Err(SweepError::Foreign { folder: folder.to_owned(), what })
+        Err(SweepError::foreign(folder, &what))
     }
 
     /// The sweep of which this one is a part, or all.
@@ -119,47 +120,39 @@ pub struct Row {
     pub cautions: Vec<String>,
 }
 
-/// Error reading a sweep that has begun.
-#[derive(Debug, thiserror::Error)]
-pub enum SweepError {
-    /// The folder holds none.
-    #[error(
-        "neither {} nor {} holds a sweep\n  help: give the --out of a sweep, finished or not",
-        .unfinished.display(), .out.display()
-    )]
-    Nothing {
-        /// The folder of an unfinished sweep.
-        unfinished: PathBuf,
-        /// The folder of outputs.
-        out: PathBuf,
-    },
-    /// A file cannot be read, or is not what was written.
-    #[error("{} cannot be read: {source}\n  help: restore it from a copy, or start the sweep again", .path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// The fault.
-        source: io::Error,
-    },
-    /// Two sweeps that are not parts of one.
-    #[error(
-        "{} and {} are not parts of one sweep\n  help: merge the shards of one command line, of one version of the program",
-        .one.display(), .other.display()
-    )]
-    Apart {
-        /// The folder of one.
-        one: PathBuf,
-        /// The folder of the other.
-        other: PathBuf,
-    },
-    /// The runs are of something else.
-    #[error("the runs in {} are {what}\n  help: restore what was changed, or start the sweep again", .folder.display())]
-    Foreign {
-        /// The folder.
-        folder: PathBuf,
-        /// The origin of the runs, in words.
-        what: String,
-    },
+/// Error in the name of an output, or reading a sweep that has begun: the fault and the remedy.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{fault}\n  help: {help}")]
+pub struct SweepError {
+    fault: String,
+    help: String,
+}
+
+impl SweepError {
+    fn new(fault: String, help: impl Into<String>) -> Self {
+        Self { fault, help: help.into() }
+    }
+
+    pub(super) fn of_output(fault: &str, help: impl Into<String>) -> Self {
+        Self::new(format!("--outputs {fault}"), help)
+    }
+
+    /// Sweeps in two folders that are not parts of one.
+    pub fn apart(one: &Path, other: &Path) -> Self {
+        let fault = format!("{} and {} are not parts of one sweep", one.display(), other.display());
+        Self::new(fault, "merge the shards of one command line, of one version of the program")
+    }
+
+    fn unreadable(path: &Path, fault: impl Display) -> Self {
+        let fault = format!("{} cannot be read: {fault}", path.display());
+        Self::new(fault, "restore it from a copy, or start the sweep again")
+    }
+
+    /// Runs of something else: `what` says of what, in words.
+    fn foreign(folder: &Path, what: &str) -> Self {
+        let fault = format!("the runs in {} are {what}", folder.display());
+        Self::new(fault, "restore what was changed, or start the sweep again")
+    }
 }
 
 /// A sweep on disk.
@@ -184,20 +177,20 @@ pub struct StoredSweep {
 pub fn read(dir: &Path) -> Result<StoredSweep, SweepError> {
     let out = out_of(dir);
     let candidates = [unfinished(&out), out.clone()];
-    let holds = |folder: &PathBuf| fs::symlink_metadata(folder.join(REQUEST)).is_ok();
-    let Some(folder) = candidates.into_iter().find(holds) else {
-        return Err(SweepError::Nothing { unfinished: unfinished(&out), out });
+    let holds = |folder: &&PathBuf| fs::symlink_metadata(folder.join(REQUEST)).is_ok();
+    let Some(folder) = candidates.iter().find(holds).cloned() else {
+        let [unfinished, out] = candidates.map(|folder| folder.display().to_string());
+        let fault = format!("neither {unfinished} nor {out} holds a sweep");
+        return Err(SweepError::new(fault, "give the --out of a sweep, finished or not"));
     };
     let begun: JournalHeader = parsed(&folder.join(REQUEST), |text| Ok(serde_json::from_slice(text)?))?;
     let (rows, whole) = parsed(&folder.join(RUNS), whole_rows)?;
-    let design = begun.request.design().map_err(|error| SweepError::Unreadable {
-        path: folder.join(REQUEST),
-        source: io::Error::other(error),
-    })?;
+    let design = begun.request.design();
+    let design = design.map_err(|error| SweepError::unreadable(&folder.join(REQUEST), error))?;
     // A row of a run that the design does not have would be of another request.
     let (runs, outputs) = (design.runs.len(), begun.request.outputs.len());
     if outputs == 0 || rows.iter().any(|row| row.run >= runs || row.outputs.len() != outputs) {
-        return Err(SweepError::Foreign { folder, what: "not those of its sweep.json".to_owned() });
+        return Err(SweepError::foreign(&folder, "not those of its sweep.json"));
     }
     Ok(StoredSweep { folder, out, begun, rows, whole })
 }
@@ -205,7 +198,7 @@ pub fn read(dir: &Path) -> Result<StoredSweep, SweepError> {
 /// Contents of a file of a sweep.
 fn parsed<T>(path: &Path, parse: impl FnOnce(&[u8]) -> io::Result<T>) -> Result<T, SweepError> {
     let read = || parse(&require_regular(path).and_then(|()| fs::read(path))?);
-    read().map_err(|source| SweepError::Unreadable { path: path.to_owned(), source })
+    read().map_err(|error| SweepError::unreadable(path, error))
 }
 
 /// Refuses a link, which may lead to a file that is not flockform's, and a pipe, which may never end.

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 
 pub(super) use journal::REQUEST;
 pub use journal::{Journal, JournalHeader, Row, StoredSweep, SweepError, SweepRequest, read};
-pub use outputs::{Output, OutputError, Probed, Quantity, Values};
+pub use outputs::{Output, Probed, Quantity, Values};
 
 use super::OutputFolder;
 use super::csv::write_below;

@@ -5,60 +5,9 @@ use std::str::FromStr;
 use serde_json::Value;
 
 use super::super::Summary;
+use super::SweepError;
 use crate::engine::Engine;
 use crate::scene::Scene;
-
-/// Error in the name of an output.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum OutputError {
-    /// A probe without a particle, or of something that particles do not have.
-    #[error(
-        "--outputs {0} is no probe\n  help: give probe.ID.QUANTITY or probe.ID.QUANTITY@STEP, with x, y, ux, uy, pe1 or pe2"
-    )]
-    Probe(String),
-    /// The body has no such particle.
-    #[error("--outputs {name}: the body has no particle {id}\n  help: final.csv of a run lists the ids")]
-    Particle {
-        /// The text given.
-        name: String,
-        /// The id in it.
-        id: usize,
-    },
-    /// A step that no run comes to.
-    #[error("--outputs {name}: the last {unit} is {last}\n  help: give one up to it, or raise {bound}")]
-    Late {
-        /// The text given.
-        name: String,
-        /// What runs count.
-        unit: &'static str,
-        /// The last of a run.
-        last: usize,
-        /// The key that sets it.
-        bound: &'static str,
-    },
-    /// The summary has no such key.
-    #[error("--outputs {name}: summary.json has no such key\n  help: {} has {}", place(.at), .there.join(", "))]
-    Unknown {
-        /// The text given.
-        name: String,
-        /// The part of the path that is there.
-        at: String,
-        /// The keys there.
-        there: Vec<String>,
-    },
-    /// The key holds several values.
-    #[error("--outputs {name} has several values\n  help: give one of them: {}", .there.join(", "))]
-    Several {
-        /// The text given.
-        name: String,
-        /// The keys below.
-        there: Vec<String>,
-    },
-}
-
-fn place(reached: &str) -> &str {
-    if reached.is_empty() { "it" } else { reached }
-}
 
 /// One value of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -103,11 +52,14 @@ impl Quantity {
 }
 
 impl FromStr for Output {
-    type Err = OutputError;
+    type Err = SweepError;
 
-    fn from_str(text: &str) -> Result<Self, OutputError> {
+    fn from_str(text: &str) -> Result<Self, SweepError> {
         let Some(probe) = text.strip_prefix("probe.") else { return Ok(Output::Summary(text.to_owned())) };
-        let refuse = || OutputError::Probe(text.to_owned());
+        let refuse = || {
+            let help = "give probe.ID.QUANTITY or probe.ID.QUANTITY@STEP, with x, y, ux, uy, pe1 or pe2";
+            SweepError::of_output(&format!("{text} is no probe"), help)
+        };
         let (place, step) = match probe.split_once('@') {
             Some((place, step)) => (place, Some(step.parse().map_err(|_| refuse())?)),
             None => (probe, None),
@@ -141,12 +93,13 @@ impl Output {
     ///
     /// # Errors
     /// Names the last step.
-    pub fn require_within(&self, scene: &Scene) -> Result<(), OutputError> {
+    pub fn require_within(&self, scene: &Scene) -> Result<(), SweepError> {
         let (last, unit) = (scene.most_steps(), scene.counts());
         match self {
             Output::Probe { name, step: Some(step), .. } if *step > last => {
                 let bound = if unit == "step" { "stop.steps" } else { "load_steps" };
-                Err(OutputError::Late { name: name.clone(), unit, last, bound })
+                let help = format!("give one up to it, or raise {bound}");
+                Err(SweepError::of_output(&format!("{name}: the last {unit} is {last}"), help))
             }
             _ => Ok(()),
         }
@@ -194,14 +147,15 @@ pub struct Values<'a> {
 impl Values<'_> {
     /// The outputs as text, empty where a value is absent: a number that is not finite, a step that was not reached.
     /// An error for each output that such a run does not have.
-    pub fn texts(&self, outputs: &[Output]) -> Vec<Result<String, OutputError>> {
+    pub fn texts(&self, outputs: &[Output]) -> Vec<Result<String, SweepError>> {
         // A summary holds what can be written.
         let summary = serde_json::to_value(self.summary).unwrap_or_default();
         let number = |value: f64| if value.is_finite() { format!("{value:?}") } else { String::new() };
         let of = |(n, output): (usize, &Output)| match output {
             Output::Summary(path) => at(&summary, path),
             Output::Probe { name, id, quantity, step } => {
-                let missing = || OutputError::Particle { name: name.clone(), id: *id };
+                let fault = || format!("{name}: the body has no particle {id}");
+                let missing = || SweepError::of_output(&fault(), "final.csv of a run lists the ids");
                 let particle = self.engine.body().particle(*id).ok_or_else(missing)?;
                 let end = || Some(quantity.of(self.engine, particle));
                 let read = if step.is_some() { self.probed.0.get(n).copied().flatten() } else { end() };
@@ -213,7 +167,7 @@ impl Values<'_> {
 }
 
 /// The value at a key path such as `mechanics.reactions[0].force[1]`; below an absent one everything is absent.
-fn at(summary: &Value, name: &str) -> Result<String, OutputError> {
+fn at(summary: &Value, name: &str) -> Result<String, SweepError> {
     let path = name.replace('[', ".").replace(']', "");
     let (mut value, mut reached) = (summary, String::new());
     for key in path.split('.') {
@@ -222,8 +176,9 @@ fn at(summary: &Value, name: &str) -> Result<String, OutputError> {
             Value::Array(items) => key.parse().ok().and_then(|n: usize| items.get(n)),
             _ => value.get(key),
         };
-        let unknown =
-            || OutputError::Unknown { name: name.to_owned(), at: reached.clone(), there: keys(value) };
+        let place = if reached.is_empty() { "it" } else { &reached };
+        let help = || format!("{place} has {}", keys(value).join(", "));
+        let unknown = || SweepError::of_output(&format!("{name}: summary.json has no such key"), help());
         value = below.ok_or_else(unknown)?;
         reached += if reached.is_empty() { "" } else { "." };
         reached += key;
@@ -232,8 +187,9 @@ fn at(summary: &Value, name: &str) -> Result<String, OutputError> {
         Value::Null => Ok(String::new()),
         Value::String(text) => Ok(text.clone()),
         Value::Array(_) | Value::Object(_) => {
-            let there = keys(value).into_iter().map(|key| format!("{name}.{key}")).collect();
-            Err(OutputError::Several { name: name.to_owned(), there })
+            let there: Vec<_> = keys(value).into_iter().map(|key| format!("{name}.{key}")).collect();
+            let help = format!("give one of them: {}", there.join(", "));
+            Err(SweepError::of_output(&format!("{name} has several values"), help))
         }
         other => Ok(other.to_string()),
     }
@@ -275,7 +231,8 @@ mod tests {
         assert_eq!(read(at_step), Ok(probe(67, Quantity::Displacement(0), Some(20), at_step)));
         assert_eq!(read(at_end), Ok(probe(3, Quantity::Pe1, None, at_end)));
         for wrong in ["probe.67", "probe.67.z", "probe.x.ux", "probe.67.ux@end", "probe."] {
-            assert_eq!(read(wrong), Err(OutputError::Probe(wrong.to_owned())));
+            let refused = read(wrong).expect_err(wrong).to_string();
+            assert!(refused.starts_with(&format!("--outputs {wrong} is no probe\n")), "{refused}");
         }
         assert_eq!(Probed::next(&[read(at_step).unwrap(), read(at_end).unwrap()], 0), 20);
         assert_eq!(Probed::next(&[read(at_step).unwrap()], 20), usize::MAX);

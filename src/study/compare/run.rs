@@ -217,23 +217,11 @@ fn is_orthogonal(scene: &Scene, engine: &Engine, layout: &Layout) -> bool {
 /// # Errors
 /// As [`Plan::new`].
 pub(crate) fn plan_led_by(scene: &Scene, truth: &Reference) -> Result<Plan, SceneError> {
-    plan_of_layout_led_by(scene, Layout::new(scene)?, truth)
+    Plan::of_layout(scene, Layout::new(scene)?, Some(&led_by(truth)))
 }
 
-/// The same of a body that is laid out.
-///
-/// # Errors
-/// As [`Plan::of_layout`].
-pub(crate) fn plan_of_layout_led_by(
-    scene: &Scene,
-    layout: Layout,
-    truth: &Reference,
-) -> Result<Plan, SceneError> {
-    Plan::of_layout(scene, layout, Some(&led_by(truth)))
-}
-
-/// A leader that the truth does not know has no place to go.
-fn led_by(truth: &Reference) -> impl Fn(&Vectors) -> Vec<Point> + '_ {
+/// The places to which this truth leads leaders; one that it does not know has no place to go.
+pub(crate) fn led_by(truth: &Reference) -> impl Fn(&Vectors) -> Vec<Point> + '_ {
     |places| match truth.displacements_at(places) {
         Ok(found) => found.iter().collect(),
         Err(_) => vec![[f64::NAN; 2]; places.len()],

@@ -164,9 +164,7 @@ fn carried(portions: &[Portion], from: &Outline, to: &Outline) -> Vec<Portion> {
         };
         let facing = from.pieces().filter(|(.., piece)| faces(piece)).map(|(ring, number, _)| [ring, number]);
         let Some((place, _)) = from.nearest_among(p, facing) else { return false };
-        let mut here =
-            portions.iter().filter(|portion| (portion.ring, portion.piece) == (place.ring, place.piece));
-        here.any(|portion| portion.t[0] <= place.t && place.t <= portion.t[1])
+        portions.iter().any(|portion| portion.has(place))
     };
     let mut found = Vec::new();
     for (ring, number, piece) in to.pieces() {

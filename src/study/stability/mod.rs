@@ -13,8 +13,3 @@ mod scaling;
 pub mod study;
 pub mod subject;
 pub mod thresholds;
-
-use crate::scene::{Scene, SceneError};
-
-/// Loads the scene with these overrides, after those that the user gave.
-pub type Load<'a> = &'a dyn Fn(&[String]) -> Result<Scene, SceneError>;

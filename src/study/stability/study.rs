@@ -4,12 +4,12 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::Load;
 use super::bisection::{Effort, Found, Growth, find, growth};
 use super::extremes::{self, Case, Outcome};
 use super::subject::{Parameter, Subject};
 use super::thresholds::{Predicted, Radius, Side, curve, predict, start};
 use crate::scene::SceneError;
+use crate::study::Load;
 
 /// A threshold from both sides.
 #[derive(Clone, Debug, PartialEq, Serialize)]

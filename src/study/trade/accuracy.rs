@@ -7,7 +7,7 @@
 
 use super::alike::{extents_of_roles, held_elsewhere, require_alike};
 use super::grid::{RuleChoice, body_overrides};
-use super::study::{Load as LoadScene, error_of, reason};
+use super::study::{error_of, reason};
 use crate::continuum::equilibrium::solve_equilibrium;
 use crate::continuum::run::Outcome;
 use crate::flock::role::Role;
@@ -15,6 +15,7 @@ use crate::scene::raw::RawMean;
 use crate::scene::text::percent;
 use crate::scene::{Scene, SceneError};
 use crate::solve::equilibrium::{Precision, Request};
+use crate::study::Load;
 use crate::study::compare::reference::Effort;
 use crate::study::compare::run::{SceneReference, plan_led_by, reference_of, require_comparable};
 
@@ -51,7 +52,7 @@ pub struct Chosen {
 ///
 /// # Errors
 /// Names what keeps the scene from being refined or held against a truth, or how near it came.
-pub fn choose(scene: Scene, load: LoadScene<'_>) -> Result<Chosen, SceneError> {
+pub fn choose(scene: Scene, load: Load<'_>) -> Result<Chosen, SceneError> {
     let Some(accuracy) = scene.equilibrium.and_then(|asked| asked.accuracy) else {
         return Ok(Chosen { scene, words: String::new(), estimate: None });
     };
@@ -102,7 +103,7 @@ const DOUBLES: &str = "equilibrium.precision=\"f64\"";
 
 /// The scene at one spacing.
 struct Body<'a> {
-    load: LoadScene<'a>,
+    load: Load<'a>,
     overrides: Vec<String>,
     part: f64,
     /// As the scene's accuracy has it.
@@ -122,7 +123,7 @@ struct Solved {
 }
 
 impl<'a> Body<'a> {
-    fn new(scene: &Scene, load: LoadScene<'a>, part: f64, accuracy: f64) -> Result<Self, SceneError> {
+    fn new(scene: &Scene, load: Load<'a>, part: f64, accuracy: f64) -> Result<Self, SceneError> {
         let overrides = body_overrides(scene, RuleChoice::Material, part);
         let scene = load(&overrides)?;
         let effort = Effort { target: (OF_TRUTH * accuracy).min(1e-3), ..Effort::default() };

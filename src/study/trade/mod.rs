@@ -12,4 +12,4 @@ mod study;
 
 pub use accuracy::{Chosen, choose};
 pub use grid::{Grid, RuleChoice, Setting};
-pub use study::{Load, Outcome, Point, Study, run};
+pub use study::{Outcome, Point, Study, run};

@@ -15,10 +15,9 @@ use crate::flock::vectors::{Vectors, distance};
 use crate::scene::text::counted;
 use crate::scene::{Scene, SceneError};
 use crate::solve::stopwatch::{Stopwatch, median};
+use crate::study::Load;
 use crate::study::compare::reference::{Effort, Reference};
-use crate::study::compare::run::{
-    SceneReference, plan_led_by, plan_of_layout_led_by, reference_of, require_comparable,
-};
+use crate::study::compare::run::{SceneReference, led_by, plan_led_by, reference_of, require_comparable};
 
 /// The outcome of a setting.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -84,9 +83,6 @@ pub struct Study {
     /// Every setting with its outcome.
     pub points: Vec<Point>,
 }
-
-/// Loads the scene with these overrides, after those that the user gave.
-pub type Load<'a> = &'a dyn Fn(&[String]) -> Result<Scene, SceneError>;
 
 /// Runs a scene in every setting of the grid. `progress` is called with each before it runs.
 ///
@@ -169,7 +165,7 @@ fn plan_alike(scene: &Scene, held: &[Extent], truth: &Reference) -> Result<Plan,
     let layout = Layout::new(scene)?;
     let own = extents_of_roles(scene, &layout)?;
     match held_elsewhere(held, &own, scene.lattice.spacing()) {
-        None => plan_of_layout_led_by(scene, layout, truth),
+        None => Plan::of_layout(scene, layout, Some(&led_by(truth))),
         Some((key, elsewhere)) => {
             let message = format!("another spacing makes another body, {elsewhere}");
             Err(scene.refuse(&key, message, "pick pieces of the outline"))

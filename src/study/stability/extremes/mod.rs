@@ -14,13 +14,13 @@ use std::ops::ControlFlow;
 
 use serde::Serialize;
 
-use super::Load;
 use crate::continuum::equilibrium::run_to_equilibrium;
 use crate::continuum::layout::Layout;
 use crate::continuum::plan::Plan;
 use crate::continuum::run::StopReason;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::{LeaderMotion, Scene, SceneError};
+use crate::study::Load;
 
 /// The outcome of an extreme.
 #[derive(Clone, Debug, PartialEq, Serialize)]
