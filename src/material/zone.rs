@@ -142,7 +142,7 @@ fn climb(start: (f64, [f64; 2]), height: impl Fn([f64; 2]) -> f64, sign: f64) ->
     while step > 1e-7 {
         let [p, q] = best.1;
         let around = |k: u32| [k % 3, k / 3].map(|k| step * (f64::from(k) - 1.0));
-        let tried = (0..9).map(|k| around(k)).map(|[a, b]| [p + a, q + b]);
+        let tried = (0..9).map(around).map(|[a, b]| [p + a, q + b]);
         let higher = tried
             // Next to the origin a wave is a translation: what it costs is rounding.
             .filter(|phase| phase[0].hypot(phase[1]) > 0.01)
