@@ -24,7 +24,8 @@ pub struct Link {
     poses: PoseSource,
     /// By observer; empty in a swarm without ranges.
     ranges: Vec<(usize, Subscription<Ranges>)>,
-    names: Vec<String>,
+    /// Of the robots, by their names.
+    numbers: ranges::Numbers,
     /// Members whose poses are received.
     heard: Vec<usize>,
     leaders: Vec<(usize, Subscription<PoseStamped>)>,
@@ -90,7 +91,7 @@ impl Link {
         Ok(Self {
             poses,
             ranges,
-            names: formation.names.clone(),
+            numbers: ranges::numbers(&formation.names),
             heard: part.heard.clone(),
             leaders,
             targets,
@@ -115,7 +116,7 @@ impl Link {
             if let Some(recorder) = &mut self.recorder {
                 recorder.take_received(topic.topic(), &message, [now, arrival]);
             }
-            ranges::ranges(&message, *observer, &self.names, arrival)
+            ranges::ranges(&message, *observer, &self.numbers, arrival)
                 .filter(|range| self.heard.binary_search(&range.of).is_ok())
                 .for_each(|range| take(Received::Range(range)));
         }
@@ -162,7 +163,7 @@ impl ControllerEnd for Link {
         match &self.targets {
             TargetTopics::Array(_) if targets.is_empty() => Ok(()),
             TargetTopics::Array(topic) => {
-                let message = array(targets, self.names.len(), header);
+                let message = array(targets, self.numbers.len(), header);
                 copy(&mut self.recorder, topic, &message, now);
                 topic.publish(&message)
             }
