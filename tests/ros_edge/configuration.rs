@@ -265,6 +265,26 @@ fn a_topic_with_two_uses_is_refused() {
         let heard = refusal(&[&format!("node.emergency_stop_topic={own:?}")], &[]);
         assert!(heard.contains("has two uses: "), "{own}: {heard}");
     }
+    // Nor may what it publishes for others be taken for poses or targets; a recording would have two types on one topic.
+    let arrays = ["node.pose_type=\"pose-array\"", "node.target_type=\"pose-array\""];
+    for own in ["~/state", "~/markers", "~/events", "/diagnostics", "/rosout", "/parameter_events"] {
+        for key in ["pose_topic", "target_topic"] {
+            let topic = format!("node.{key}={own:?}");
+            let shared = refusal(&[&arrays[..], &[&topic]].concat(), &[]);
+            let leaf = own.trim_start_matches('~');
+            assert!(
+                shared.contains(&format!("{leaf} has two uses: ")) && shared.contains(" of this node"),
+                "{shared}"
+            );
+        }
+    }
+    for rule in ["/robot_1/target_pose:=/flockform/state", "~/state:=/robot_1/target_pose"] {
+        let shared = refusal(&[], &["-r", rule]);
+        assert!(shared.contains("has two uses: states of this node and targets of robot_1"), "{shared}");
+    }
+    let timed = ["node.pose_type=\"pose-array\"", "node.pose_topic=\"/clock\""];
+    let shared = refusal(&timed, &["-p", "use_sim_time:=true"]);
+    assert!(shared.contains("topic /clock has two uses: "), "{shared}");
     let file = square(&[&PATIENT[..], &["node.emergency_stop_topic=\"/rosout\""]].concat());
     let mut node = FormationNode::open(&file, &arguments(&[]), None).expect("without a log");
     let heard = node.publish_log(std::sync::mpsc::channel().1).expect_err("two uses").to_string();
@@ -273,9 +293,16 @@ fn a_topic_with_two_uses_is_refused() {
     // Without leaders moved by topic and without velocities those topics are not used.
     let unused = ["-p", "leader_topic:=/places", "-p", "velocity_topic:=/places"];
     drop(Swarming::open(&square(&PATIENT), &unused));
-    for topic in ["node.target_topic=\"goal\"", "node.pose_topic=\"{name}/target_pose\""] {
+    for topic in [
+        "node.target_topic=\"goal\"",
+        "node.pose_topic=\"{name}/target_pose\"",
+        "node={ pose_type = \"pose-array\", pose_topic = \"/tf\" }",
+        "node={ pose_type = \"pose-array\", pose_topic = \"/clock\" }",
+        "node={ pose_type = \"pose-array\", pose_topic = \"/rosout\" }",
+    ] {
         let file = square(&[&PATIENT[..], &[topic]].concat());
-        let refused = RobotNodes::open(&file, &arguments(&[]), Layout::OneNode).err().expect("two uses");
+        let own_time = arguments(&["-p", "publish_clock:=true"]);
+        let refused = RobotNodes::open(&file, &own_time, Layout::OneNode).err().expect("two uses");
         assert!(refused.to_string().contains("has two uses"), "{refused}");
     }
 
