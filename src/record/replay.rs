@@ -269,9 +269,9 @@ impl Replay {
             }
             Some(Heard::Poses) => {
                 let Some(PoseArray { header, poses }) = entry.decode() else { return };
-                for &member in &self.heard_of {
-                    if let Some(&pose) = poses.get(member) {
-                        self.waiting.push((member, header.clone(), pose, entry.published));
+                if poses.len() == self.recorded.len() {
+                    for &member in &self.heard_of {
+                        self.waiting.push((member, header.clone(), poses[member], entry.published));
                     }
                 }
             }

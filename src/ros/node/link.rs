@@ -36,7 +36,7 @@ pub struct Link {
     misframed: u64,
     /// By member, the frame of its last pose in another than the swarm's.
     wrong_frames: BTreeMap<usize, String>,
-    /// Of leaders' places; those of poses are the loop's.
+    /// Of leaders' places and arrays of poses; those of single poses are the loop's.
     complaints: Complaints,
     /// Gets a copy of what goes through.
     pub recorder: Option<MessageRecorder>,
@@ -87,7 +87,7 @@ impl Link {
         let has_ranges = control.watch().limits().ranges.is_some();
         let ranging = part.heard.iter().copied().filter(|_| has_ranges);
         let ranges = each(node, ranging, |m| topic(&raw.ranges_topic, m))?;
-        let poses = PoseSource::open(node, raw, &part.heard, topic)?;
+        let poses = PoseSource::open(node, raw, &part.heard, formation.count(), topic)?;
         Ok(Self {
             poses,
             ranges,
@@ -131,7 +131,8 @@ impl ControllerEnd for Link {
         self.receive_ranges(now, take);
         let copies = self.recorder.as_mut().map(|recorder| (recorder, now));
         let wrong_frames = &mut self.wrong_frames;
-        self.poses.take(&self.frame_id, simulated, copies, &mut |m, pose, frame| {
+        let complaints = &mut self.complaints;
+        self.poses.take(&self.frame_id, simulated, copies, complaints, &mut |m, pose, frame| {
             if !pose.frame_is_right {
                 wrong_frames.insert(m, said(frame).to_string());
             }

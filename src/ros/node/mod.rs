@@ -314,7 +314,8 @@ impl FormationNode {
     /// Whether a pose is of use, or any came since this was last asked: one that is not believed is heard as well.
     fn hears_any(&mut self) -> bool {
         let heard = || self.origin.part.heard.iter();
-        let came: u64 = heard().map(|&m| self.control.watch().counts(m).all()).sum();
+        let refused = self.endpoints.as_ref().map_or(0, |endpoints| endpoints.link.refused());
+        let came = heard().map(|&m| self.control.watch().counts(m).all()).sum::<u64>() + refused;
         let is_any = came != self.came || heard().any(|&m| self.control.health(m).is_usable());
         self.came = came;
         is_any
