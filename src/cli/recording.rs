@@ -37,17 +37,17 @@ impl RecordArguments {
     }
 
     /// The same beside nothing. A process that goes on where another ended leaves that one's file (`.mcap.part`) and writes
-    /// FILE.2.mcap, and so on.
+    /// FILE.2.mcap, and so on: the first of these names that is free.
     pub fn open(&self, about: &About, force: bool, life: u32) -> Result<Option<Shared>, RecordError> {
         Ok(self.create(about, force, life)?.map(Shared::new))
     }
 
     fn create(&self, about: &About, force: bool, life: u32) -> Result<Option<Recording>, RecordError> {
-        let path = self.record.as_ref().map(|path| match life {
-            1 => path.clone(),
-            _ => path.with_extension(format!("{life}.mcap")),
-        });
-        path.map(|path| Recording::create(&path, about, force)).transpose()
+        let of_life = |path: &PathBuf| {
+            let mut names = (life..).map(|life| path.with_extension(format!("{life}.mcap")));
+            if life == 1 { Some(path.clone()) } else { names.find(|path| path.symlink_metadata().is_err()) }
+        };
+        self.record.as_ref().and_then(of_life).map(|path| Recording::create(&path, about, force)).transpose()
     }
 
     /// Refuses a recording of what has none.
@@ -64,4 +64,27 @@ pub fn close(shared: Option<Shared>) -> Result<String, RecordError> {
     let messages = recording.messages();
     let path = recording.finish()?;
     Ok(format!("{messages} messages recorded in {}\n", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_process_that_goes_on_where_another_ended_takes_the_first_free_name() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let record = Some(folder.path().join("f.mcap"));
+        let arguments = RecordArguments { record };
+        let part = |life| {
+            let recording = arguments.open(&About::default(), false, life).expect("a free name");
+            recording.and_then(|shared| shared.take()).expect("one is asked for").part().to_owned()
+        };
+        assert_eq!(part(2), folder.path().join("f.2.mcap.part"));
+        std::fs::write(folder.path().join("f.2.mcap"), "of an earlier flight").expect("written");
+        assert_eq!(part(2), folder.path().join("f.3.mcap.part"));
+        assert_eq!(part(4), folder.path().join("f.4.mcap.part"));
+        std::fs::write(folder.path().join("f.mcap"), "of an earlier flight").expect("written");
+        let refused = arguments.open(&About::default(), false, 1).err().map(|error| error.to_string());
+        assert!(refused.is_some_and(|said| said.contains("f.mcap") && said.contains("exists")));
+    }
 }

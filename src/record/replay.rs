@@ -165,6 +165,7 @@ struct Replay {
     has_topics: bool,
     frame_id: String,
     heard_of: Vec<usize>,
+    numbers: ranges::Numbers,
     mine: Vec<bool>,
     tolerance: f64,
     has_events: bool,
@@ -220,6 +221,7 @@ impl Replay {
             as_recorded: parameters(&before).to_vec(),
             robots: control.formation().names.iter().map(robot).collect(),
             mine: (0..count).map(|m| member.is_none_or(|one| one == m)).collect(),
+            numbers: ranges::numbers(&control.formation().names),
             frame_id: swarm.raw.node.frame_id.clone(),
             active: !has_events,
             today: vec![None; count],
@@ -269,9 +271,9 @@ impl Replay {
             }
             Some(Heard::Poses) => {
                 let Some(PoseArray { header, poses }) = entry.decode() else { return };
-                for &member in &self.heard_of {
-                    if let Some(&pose) = poses.get(member) {
-                        self.waiting.push((member, header.clone(), pose, entry.published));
+                if poses.len() == self.recorded.len() {
+                    for &member in &self.heard_of {
+                        self.waiting.push((member, header.clone(), poses[member], entry.published));
                     }
                 }
             }
@@ -400,9 +402,8 @@ impl Replay {
         self.exact.insert(Time::from_seconds(now), now);
         for (observer, message, arrival) in std::mem::take(&mut self.measured) {
             let stamp = self.stamp_of(&message.header, arrival);
-            let names = &self.control.formation().names;
-            let all: Vec<_> = ranges::ranges(&message, observer, names, arrival).collect();
-            for range in all.into_iter().filter(|range| self.heard_of.binary_search(&range.of).is_ok()) {
+            let all = ranges::ranges(&message, observer, &self.numbers, arrival);
+            for range in all.filter(|range| self.heard_of.binary_search(&range.of).is_ok()) {
                 self.control.receive_range(Range { stamp, ..range }, now);
             }
         }

@@ -148,7 +148,19 @@ impl Link {
         let of = |pattern: &str, m: usize| -> Result<_, NodeError> {
             Ok(owners[owner(m)].robot_topic(pattern, &formation.names[m])?)
         };
-        check_topics(&swarm.raw, formation, &of)?;
+        let is_one = layout == Layout::OneNode;
+        let is_served = is_one && raw.serves(RawService::Parameters);
+        let mut uses = Uses::default();
+        uses.add_own(
+            &owners[0],
+            &[
+                ("/tf", "frames", true),
+                ("/rosout", "log lines", true),
+                ("/parameter_events", "changed parameters", is_served),
+                ("/clock", "the time", publishes_clock),
+            ],
+        )?;
+        check_topics(&swarm.raw, formation, &of, uses)?;
         let target = |m: usize| -> Result<_, NodeError> {
             Ok(nodes[owner(m)].subscription(&of(&raw.target_topic, m)?, Quality::reliable(1))?.steady())
         };
@@ -178,8 +190,6 @@ impl Link {
         let clock = publishes_clock
             .then(|| first.publisher(&first.topic("/clock")?, Quality::BEST_EFFORT))
             .transpose()?;
-        let is_one = layout == Layout::OneNode;
-        let is_served = is_one && raw.serves(RawService::Parameters);
         let parameters = is_one.then(|| Parameters::open(first, store, is_served)).transpose()?;
         let describes = is_one && raw.serves(RawService::TypeDescription);
         let descriptions = describes.then(|| TypeDescriptions::new(first)).transpose()?;
@@ -425,10 +435,14 @@ fn owners(formation: &Formation, arguments: &RosArguments, layout: Layout) -> Re
     }
 }
 
-/// Refuses topics of the robots with two uses.
-fn check_topics(raw: &RawSwarm, formation: &Formation, topic: TopicOf<'_>) -> Result<(), NodeError> {
+/// Refuses topics of the robots with two uses, or with one of those that there are.
+fn check_topics(
+    raw: &RawSwarm,
+    formation: &Formation,
+    topic: TopicOf<'_>,
+    mut uses: Uses,
+) -> Result<(), NodeError> {
     let (has_ranges, raw) = (raw.ranges.is_some(), &raw.node);
-    let mut uses = Uses::default();
     for (m, robot) in formation.names.iter().enumerate() {
         if m == 0 || !raw.has_target_array() {
             uses.add(topic(&raw.target_topic, m)?, "targets", robot)?;

@@ -1,5 +1,6 @@
 //! A service's two sides: a writer that fills slices of shared memory in place, a reader that borrows them.
 
+use std::mem::MaybeUninit;
 use std::ops::{Deref, DerefMut};
 use std::rc::Rc;
 use std::time::Duration;
@@ -47,7 +48,12 @@ impl Capacity {
 
     /// Slices that a writer needs so that it never runs out of them, whatever its readers do.
     pub fn slices(&self) -> usize {
-        self.readers * (self.queue + self.borrowed) + self.history + 1
+        self.slices_of(self.readers)
+    }
+
+    /// The same with so many readers.
+    fn slices_of(&self, readers: usize) -> usize {
+        readers * (self.queue + self.borrowed) + self.history + 1
     }
 
     fn nodes(&self) -> usize {
@@ -248,7 +254,8 @@ pub struct Writer<T: Payload> {
 }
 
 impl<T: Payload> Writer<T> {
-    /// Of `flockform/SPACE/LEAF`, of slices of at most `most` elements, for which the memory is taken now.
+    /// Of `flockform/SPACE/LEAF`, of slices of at most `most` elements. Where there is room for it, the memory of those that
+    /// one reader can keep it from using again is taken now: a `/dev/shm` that is full later does not end it then.
     ///
     /// # Errors
     /// A service of another type or of less capacity, no place left in it, or no memory.
@@ -281,7 +288,7 @@ impl<T: Payload> Writer<T> {
             .name(&part)
             .initial_max_slice_len(most.max(1))
             .allocation_strategy(AllocationStrategy::Static)
-            .max_loaned_samples(1)
+            .max_loaned_samples(capacity.slices_of(1))
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .override_sample_preallocation(move |worst| worst.min(slices))
             .create()
@@ -297,7 +304,21 @@ impl<T: Payload> Writer<T> {
         let notifier = opened.event.notifier_builder().create();
         let notifier = notifier.map_err(|error| opened.port("writer", error, capacity.writers))?;
         let Opened { name: service, slices: factory, .. } = opened;
-        Ok(Self { service, publisher, notifier, factory, sequence: 0, part, others: 0 })
+        let writer = Self { service, publisher, notifier, factory, sequence: 0, part, others: 0 };
+        writer.take_memory(capacity.slices_of(1).min(slices), most);
+        Ok(writer)
+    }
+
+    /// Writes in so many slices of `most` elements, which are free again afterwards: only then has the system given them
+    /// memory, and slices that were used are used again before others are.
+    fn take_memory(&self, slices: usize, most: usize) {
+        if folders::require_room((slices * most * size_of::<T>()) as u64).is_err() {
+            return;
+        }
+        let loan = |_| self.publisher.loan_slice_uninit(most).ok();
+        // All at once, or it would be one slice again and again.
+        let mut loaned: Vec<_> = (0..slices).map_while(loan).collect();
+        loaned.iter_mut().for_each(|slice| slice.payload_mut().fill_with(MaybeUninit::zeroed));
     }
 
     /// Borrows a slice of `count` elements, fills it in place with `element`, hands it to all readers and wakes them.

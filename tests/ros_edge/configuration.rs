@@ -4,11 +4,11 @@ use std::sync::mpsc::{channel, sync_channel};
 
 use flockform::flock::vectors::distance;
 use flockform::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
-use flockform::messages::flockform_msgs::FormationState;
+use flockform::messages::flockform_msgs::{FormationState, LoopEvent};
 use flockform::messages::geometry_msgs::PoseStamped;
 use flockform::messages::rcl_interfaces::{Parameter, SetParameters, Settings};
 use flockform::record::replay::replay_file;
-use flockform::record::{About, Recording, Shared};
+use flockform::record::{About, Reader, Recording, Shared};
 use flockform::ros::edge::Quality;
 use flockform::ros::edge::parameters::Value;
 use flockform::ros::node::{CommandQueue, FormationNode, NodeCommand};
@@ -129,6 +129,53 @@ fn a_recording_with_a_cleanup_in_it_replays_to_the_bit() {
     assert!(report.robots.iter().all(|robot| robot.recorded > 30), "{:?}", report.robots);
 }
 
+#[test]
+fn a_recording_by_a_simulator_s_time_begins_with_that_and_replays_to_the_bit() {
+    let _peers = peers();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("flight.mcap");
+    let legs = "manoeuvres[0].legs=[{ seconds = 20.0, translate = [2.0, 0.5] }]";
+    let file = square(&[&PATIENT[..], &[legs]].concat());
+    let about = About { source: "node", ..About::default() };
+    let recording = Shared::new(Recording::create(&path, &about, false).expect("writable"));
+    let mut node =
+        FormationNode::open(&file, &arguments(&["-p", "use_sim_time:=true"]), None).expect("a node");
+    node.record(recording.sink()).expect("named");
+    // Asked of it before there is any time.
+    let (ask, commands) = channel();
+    let (answers, _answers) = sync_channel(4);
+    node.take_commands(CommandQueue { commands, answers });
+    for (number, command) in [NodeCommand::EmergencyStop, NodeCommand::Resume].into_iter().enumerate() {
+        ask.send((number as u64, command)).expect("taken");
+        node.tick();
+    }
+    let own_time = arguments(&["-p", "publish_clock:=true"]);
+    let robots = RobotNodes::open(&file, &own_time, Layout::OneNode).expect("robots");
+    let mut swarm = Swarming { node, robots };
+    swarm.until_all_are_heard();
+    swarm.fly_until("the leaders are under way", |swarm| swarm.node.control().program_time() > 0.3);
+    let last = swarm.robots.fleet().time();
+    drop(swarm);
+    recording.take().expect("open").finish().expect("whole");
+    let (mut times, mut kinds) = (Vec::new(), Vec::new());
+    let damage = Reader::open(&path).expect("readable").each(&mut |entry| {
+        times.push(entry.published);
+        if let Some(event) = entry.decode::<LoopEvent>() {
+            times.push(event.header.stamp.seconds());
+            kinds.push(event.kind);
+        }
+    });
+    assert_eq!(damage, None);
+    assert!(times.iter().all(|time| (0.0..=last).contains(time)), "{:?}", times.first());
+    let first = kinds.iter().position(|kind| *kind == LoopEvent::TICK).expect("ticks");
+    for kind in [LoopEvent::ACTIVE, LoopEvent::EMERGENCY_STOP, LoopEvent::RESUME, LoopEvent::PARAMETER] {
+        assert!(kinds[..first].contains(&kind), "{kind} before the first tick: {kinds:?}");
+    }
+    let report = replay_file(&path, Some(file), &[], 0.0).expect("readable");
+    assert!(report.holds(), "{:?}", report.robots);
+    assert!(report.robots.iter().all(|robot| robot.recorded > 20), "{:?}", report.robots);
+}
+
 /// What is asked of it before its first tick comes after what it takes over.
 #[test]
 fn a_recording_of_a_process_that_goes_on_where_another_ended_replays_to_the_bit() {
@@ -218,6 +265,26 @@ fn a_topic_with_two_uses_is_refused() {
         let heard = refusal(&[&format!("node.emergency_stop_topic={own:?}")], &[]);
         assert!(heard.contains("has two uses: "), "{own}: {heard}");
     }
+    // Nor may what it publishes for others be taken for poses or targets; a recording would have two types on one topic.
+    let arrays = ["node.pose_type=\"pose-array\"", "node.target_type=\"pose-array\""];
+    for own in ["~/state", "~/markers", "~/events", "/diagnostics", "/rosout", "/parameter_events"] {
+        for key in ["pose_topic", "target_topic"] {
+            let topic = format!("node.{key}={own:?}");
+            let shared = refusal(&[&arrays[..], &[&topic]].concat(), &[]);
+            let leaf = own.trim_start_matches('~');
+            assert!(
+                shared.contains(&format!("{leaf} has two uses: ")) && shared.contains(" of this node"),
+                "{shared}"
+            );
+        }
+    }
+    for rule in ["/robot_1/target_pose:=/flockform/state", "~/state:=/robot_1/target_pose"] {
+        let shared = refusal(&[], &["-r", rule]);
+        assert!(shared.contains("has two uses: states of this node and targets of robot_1"), "{shared}");
+    }
+    let timed = ["node.pose_type=\"pose-array\"", "node.pose_topic=\"/clock\""];
+    let shared = refusal(&timed, &["-p", "use_sim_time:=true"]);
+    assert!(shared.contains("topic /clock has two uses: "), "{shared}");
     let file = square(&[&PATIENT[..], &["node.emergency_stop_topic=\"/rosout\""]].concat());
     let mut node = FormationNode::open(&file, &arguments(&[]), None).expect("without a log");
     let heard = node.publish_log(std::sync::mpsc::channel().1).expect_err("two uses").to_string();
@@ -226,9 +293,16 @@ fn a_topic_with_two_uses_is_refused() {
     // Without leaders moved by topic and without velocities those topics are not used.
     let unused = ["-p", "leader_topic:=/places", "-p", "velocity_topic:=/places"];
     drop(Swarming::open(&square(&PATIENT), &unused));
-    for topic in ["node.target_topic=\"goal\"", "node.pose_topic=\"{name}/target_pose\""] {
+    for topic in [
+        "node.target_topic=\"goal\"",
+        "node.pose_topic=\"{name}/target_pose\"",
+        "node={ pose_type = \"pose-array\", pose_topic = \"/tf\" }",
+        "node={ pose_type = \"pose-array\", pose_topic = \"/clock\" }",
+        "node={ pose_type = \"pose-array\", pose_topic = \"/rosout\" }",
+    ] {
         let file = square(&[&PATIENT[..], &[topic]].concat());
-        let refused = RobotNodes::open(&file, &arguments(&[]), Layout::OneNode).err().expect("two uses");
+        let own_time = arguments(&["-p", "publish_clock:=true"]);
+        let refused = RobotNodes::open(&file, &own_time, Layout::OneNode).err().expect("two uses");
         assert!(refused.to_string().contains("has two uses"), "{refused}");
     }
 

@@ -138,6 +138,9 @@ fn simulated_robots_fly_the_manoeuvre_that_the_node_leads() {
     assert_eq!(state.members.iter().filter(|member| member.role == MemberState::LEADER).count(), 4);
     assert!(state.members.iter().all(|member| member.health == MemberState::FRESH));
     assert!(state.clearance > 0.3 - 1e-9, "{}", state.clearance);
+    let followers = state.members.iter().filter(|member| member.role == MemberState::FOLLOWER);
+    let farthest = followers.map(|member| member.to_settled).fold(0.0, f64::max);
+    assert_eq!(state.formation_error, farthest, "as its definition says");
     assert_eq!(markers.markers.iter().filter(|marker| marker.ns == "members").count(), 25);
     assert_eq!(report.status[0].name, "/flockform: formation");
 }

@@ -8,7 +8,7 @@ use flockform::flock::vectors::distance;
 use flockform::messages::builtin_interfaces::Time;
 use flockform::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use flockform::messages::geometry_msgs;
-use flockform::messages::geometry_msgs::{Pose, PoseStamped, Twist, TwistStamped};
+use flockform::messages::geometry_msgs::{Pose, PoseArray, PoseStamped, Twist, TwistStamped};
 use flockform::messages::rosgraph_msgs::Clock;
 use flockform::messages::std_msgs::Header;
 use flockform::messages::tf2_msgs::TFMessage;
@@ -66,6 +66,47 @@ fn poses_come_in_every_type_of_message() {
         for m in 0..control.formation().count() {
             assert_eq!(control.watch().counts(m).rejected(), 0, "{kind}");
         }
+    }
+}
+
+#[test]
+fn an_array_of_another_number_of_poses_is_dropped_as_a_whole_and_counted() {
+    let peers = peers();
+    let sender = peers.theirs.node("/", "camera").expect("a node");
+    let poses = sender.publisher::<PoseArray>("/camera/poses", Quality::BEST_EFFORT).expect("out");
+    let reports =
+        sender.subscription::<DiagnosticArray>("/diagnostics", Quality::reliable(50)).expect("hears");
+    let overrides = with(&["node.pose_type=\"pose-array\"", "node.pose_topic=\"/camera/poses\""]);
+    let more = ["-r", "__node:=watched_by_camera"];
+    let mut node = FormationNode::open(&square(&overrides), &arguments(&more), None).expect("a node");
+    let places: Vec<[f64; 2]> = node.control().formation().places.iter().collect();
+    let mut send = |places: &[[f64; 2]]| {
+        let poses_of = places.iter().map(|&place| Pose::planar(place, 0.0)).collect();
+        let header = stamped([0.0; 2], "map").header;
+        poses.publish(&PoseArray { header, poses: poses_of }).expect("sent");
+        std::thread::sleep(Duration::from_millis(5));
+        node.tick();
+        let accepted: Vec<u64> = (0..25).map(|m| node.control().watch().counts(m).accepted).collect();
+        let refused = std::iter::from_fn(|| reports.take())
+            .flat_map(|(report, _)| report.status)
+            .filter(|status| status.name == "/watched_by_camera: formation")
+            .flat_map(|status| status.values)
+            .find(|value| value.key == "messages refused");
+        (accepted, refused.map(|value| value.value))
+    };
+    until("all are heard", || send(&places).0.iter().all(|&count| count > 0).then_some(()));
+    let added = [&places[..], &[[9.0, 9.0]]].concat();
+    for others in [&added[..], &places[1..], &[]] {
+        // What was on its way arrives.
+        (0..20).for_each(|_| drop(send(&[])));
+        let (before, _) = send(&[]);
+        let mut counts = Vec::new();
+        until("they are counted", || {
+            let (accepted, refused) = send(others);
+            assert_eq!(accepted, before, "{} poses of 25 robots", others.len());
+            counts.extend(refused.and_then(|count| count.parse::<u64>().ok()));
+            (counts.last() > counts.first() && counts.len() > 1).then_some(())
+        });
     }
 }
 

@@ -159,3 +159,35 @@ fn a_reader_looks_into_the_memory_that_the_writer_filled() {
     drop((first, second));
     assert!(reader.take().is_none());
 }
+
+/// A full `/dev/shm` ends a process that writes where it has not written before.
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_that_one_reader_can_make_a_writer_use_is_taken_when_it_is_opened() {
+    use std::os::unix::fs::MetadataExt;
+    let name = domain_name();
+    let peer = domain(&name).join("test").expect("shared memory");
+    let taken = || -> u64 {
+        let files = std::fs::read_dir("/dev/shm").expect("a folder").flatten();
+        let own = files.filter(|file| file.file_name().to_string_lossy().starts_with(&format!("{name}_")));
+        own.filter_map(|file| file.metadata().ok()).map(|file| 512 * file.blocks()).sum()
+    };
+    let capacity = Capacity::SWARM;
+    let mut writer = Writer::<WirePose>::open(&peer, "row", POSES, &capacity, 500).expect("a writer");
+    let reader = Reader::<WirePose>::open(&peer, "row", POSES, &capacity).expect("a reader");
+    let element = |_| WirePose { member: 1, frame: 0, position: [0.5, 1.5], yaw: 2.0, stamp: 3.0 };
+    writer.send(1.0, 1, 1, element).expect("sent");
+    let mut held = vec![reader.take().expect("the first")];
+    let before = taken();
+    for step in 2..50 {
+        writer.send(1.0, step, 500, element).expect("sent");
+        if held.len() < capacity.borrowed {
+            held.extend(reader.take());
+        }
+    }
+    assert_eq!(
+        (held.len(), taken()),
+        (capacity.borrowed, before),
+        "by a reader that holds what it can and sleeps"
+    );
+}

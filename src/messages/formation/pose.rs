@@ -23,7 +23,21 @@ pub fn said(pose: &Pose, frame_id: &str) -> (Header, geometry_msgs::Pose) {
     (header, geometry_msgs::Pose::planar(pose.position, pose.yaw))
 }
 
-/// Whether a header speaks of this frame; older tools write a slash before it.
+/// Whether a header speaks of this frame; older tools and files write a slash before it.
 pub fn is_frame(said: &str, meant: &str) -> bool {
-    said.strip_prefix('/').unwrap_or(said) == meant
+    let [said, meant] = [said, meant].map(|name| name.strip_prefix('/').unwrap_or(name));
+    said == meant
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slash_before_a_frame_says_nothing_on_either_side() {
+        for said in ["map", "/map"] {
+            assert!(is_frame(said, "map") && is_frame(said, "/map"), "{said}");
+            assert!(!is_frame(said, "/odom") && !is_frame(said, "//map"), "{said}");
+        }
+    }
 }

@@ -24,7 +24,8 @@ pub struct Link {
     poses: PoseSource,
     /// By observer; empty in a swarm without ranges.
     ranges: Vec<(usize, Subscription<Ranges>)>,
-    names: Vec<String>,
+    /// Of the robots, by their names.
+    numbers: ranges::Numbers,
     /// Members whose poses are received.
     heard: Vec<usize>,
     leaders: Vec<(usize, Subscription<PoseStamped>)>,
@@ -35,7 +36,7 @@ pub struct Link {
     misframed: u64,
     /// By member, the frame of its last pose in another than the swarm's.
     wrong_frames: BTreeMap<usize, String>,
-    /// Of leaders' places; those of poses are the loop's.
+    /// Of leaders' places and arrays of poses; those of single poses are the loop's.
     complaints: Complaints,
     /// Gets a copy of what goes through.
     pub recorder: Option<MessageRecorder>,
@@ -86,11 +87,11 @@ impl Link {
         let has_ranges = control.watch().limits().ranges.is_some();
         let ranging = part.heard.iter().copied().filter(|_| has_ranges);
         let ranges = each(node, ranging, |m| topic(&raw.ranges_topic, m))?;
-        let poses = PoseSource::open(node, raw, &part.heard, topic)?;
+        let poses = PoseSource::open(node, raw, &part.heard, formation.count(), topic)?;
         Ok(Self {
             poses,
             ranges,
-            names: formation.names.clone(),
+            numbers: ranges::numbers(&formation.names),
             heard: part.heard.clone(),
             leaders,
             targets,
@@ -115,7 +116,7 @@ impl Link {
             if let Some(recorder) = &mut self.recorder {
                 recorder.take_received(topic.topic(), &message, [now, arrival]);
             }
-            ranges::ranges(&message, *observer, &self.names, arrival)
+            ranges::ranges(&message, *observer, &self.numbers, arrival)
                 .filter(|range| self.heard.binary_search(&range.of).is_ok())
                 .for_each(|range| take(Received::Range(range)));
         }
@@ -130,7 +131,8 @@ impl ControllerEnd for Link {
         self.receive_ranges(now, take);
         let copies = self.recorder.as_mut().map(|recorder| (recorder, now));
         let wrong_frames = &mut self.wrong_frames;
-        self.poses.take(&self.frame_id, simulated, copies, &mut |m, pose, frame| {
+        let complaints = &mut self.complaints;
+        self.poses.take(&self.frame_id, simulated, copies, complaints, &mut |m, pose, frame| {
             if !pose.frame_is_right {
                 wrong_frames.insert(m, said(frame).to_string());
             }
@@ -162,7 +164,7 @@ impl ControllerEnd for Link {
         match &self.targets {
             TargetTopics::Array(_) if targets.is_empty() => Ok(()),
             TargetTopics::Array(topic) => {
-                let message = array(targets, self.names.len(), header);
+                let message = array(targets, self.numbers.len(), header);
                 copy(&mut self.recorder, topic, &message, now);
                 topic.publish(&message)
             }

@@ -59,6 +59,9 @@ pub use link::Link;
 use origin::Origin;
 use settings::Settings;
 
+/// Events that wait for the time at most: a peer that goes on asking before there is one.
+const MOST_UNTIMED: usize = 10_000;
+
 /// A formation's node.
 pub struct FormationNode {
     clock: Clock,
@@ -90,6 +93,8 @@ pub struct FormationNode {
     is_changed: Cell<bool>,
     /// Gets a copy of what goes through; with the topics while there are any.
     recorder: Option<MessageRecorder>,
+    /// Kinds, texts and values of events for the recorder from before a simulator's clock has said the time.
+    untimed: Vec<(u8, String, Vec<f64>)>,
     diagnostics: Publisher<DiagnosticArray>,
     statistics: Statistics,
     /// Poses that had come when the watchdog last asked.
@@ -157,6 +162,7 @@ impl FormationNode {
             is_new: false,
             is_changed: Cell::new(false),
             recorder: None,
+            untimed: Vec::new(),
             diagnostics: node.publisher(&names.topic("/diagnostics")?, Quality::reliable(5))?,
             statistics: Statistics::default(),
             came: 0,
@@ -203,9 +209,9 @@ impl FormationNode {
     /// A name that no topic can have.
     pub fn record(&mut self, sink: RecordSink) -> Result<(), NameError> {
         let origin = &self.origin;
-        let mut recorder = MessageRecorder::new(&origin.names, &origin.swarm.raw.node.frame_id, sink)?;
-        recorder.parameters(self.time(), &self.control);
+        let recorder = MessageRecorder::new(&origin.names, &origin.swarm.raw.node.frame_id, sink)?;
         *self.recorder() = Some(recorder);
+        self.record_parameters(self.time());
         self.is_new = false;
         Ok(())
     }
@@ -281,6 +287,7 @@ impl FormationNode {
         self.follow(now, |lifecycle, act| lifecycle.shut_down(now, act));
         // Robots that are driven by velocities would go on for ever.
         self.publish(now, self.lifecycle.is_active());
+        self.record_untimed(now);
         self.rosout.iter().for_each(Rosout::publish);
         true
     }
@@ -307,7 +314,8 @@ impl FormationNode {
     /// Whether a pose is of use, or any came since this was last asked: one that is not believed is heard as well.
     fn hears_any(&mut self) -> bool {
         let heard = || self.origin.part.heard.iter();
-        let came: u64 = heard().map(|&m| self.control.watch().counts(m).all()).sum();
+        let refused = self.endpoints.as_ref().map_or(0, |endpoints| endpoints.link.refused());
+        let came = heard().map(|&m| self.control.watch().counts(m).all()).sum::<u64>() + refused;
         let is_any = came != self.came || heard().any(|&m| self.control.health(m).is_usable());
         self.came = came;
         is_any
@@ -338,6 +346,9 @@ impl FormationNode {
             tracing::warn!("time went back by {jump} s: waiting for poses of the new time");
         }
         let stamp = self.time();
+        if self.clock.now().is_some() || self.untimed.len() > MOST_UNTIMED {
+            self.record_untimed(stamp);
+        }
         self.answer(stamp);
         if !self.lifecycle.is_active() {
             self.publish(stamp, false);
@@ -499,9 +510,22 @@ impl FormationNode {
         twin.into_iter().chain(self.no_clock()).collect()
     }
 
+    /// An event at `now` \[s\]; where the clock has no time yet, at the first that it has: a recording has one kind of time.
     fn record_event(&mut self, now: f64, kind: u8, text: &str, values: &[f64]) {
-        if let Some(recorder) = self.recorder() {
-            recorder.event(now, kind, text, values);
+        let has_time = self.clock.now().is_some();
+        match self.recorder() {
+            Some(recorder) if has_time => recorder.event(now, kind, text, values),
+            Some(_) => self.untimed.push((kind, text.to_owned(), values.to_vec())),
+            None => {}
+        }
+    }
+
+    /// The events from before there was a time.
+    fn record_untimed(&mut self, now: f64) {
+        for (kind, text, values) in std::mem::take(&mut self.untimed) {
+            if let Some(recorder) = self.recorder() {
+                recorder.event(now, kind, &text, &values);
+            }
         }
     }
 
@@ -511,6 +535,10 @@ impl FormationNode {
             return;
         }
         self.record_event(now, LoopEvent::CONFIGURE, "", &[]);
+        self.record_parameters(now);
+    }
+
+    fn record_parameters(&mut self, now: f64) {
         for (name, value) in recorder::parameters(&self.control) {
             self.record_event(now, LoopEvent::PARAMETER, name, &[value]);
         }

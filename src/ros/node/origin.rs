@@ -7,11 +7,12 @@ use super::settings::{Field, TOPICS};
 use super::uses::Uses;
 use crate::messages::builtin_interfaces::Time;
 use crate::messages::names::Names;
+use crate::messages::recorder::EVENTS;
 use crate::messages::std_msgs::Header;
 use crate::ros::edge::Node;
 use crate::ros::edge::parameters::{Parameters, Value};
 use crate::scene::swarm::Swarm;
-use crate::scene::swarm::raw::RawPoseType;
+use crate::scene::swarm::raw::{RawPoseType, RawService};
 use crate::swarm::control::Control;
 use crate::swarm::control::scope::NodeScope;
 
@@ -49,7 +50,7 @@ impl Origin {
         TOPICS.into_iter().filter_map(changed).collect()
     }
 
-    /// Refuses topics that `configure` could not open, and topics of the fleet with two uses.
+    /// Refuses topics that `configure` could not open, and topics with two uses: of the fleet, or the node's own.
     ///
     /// # Errors
     /// The first name that ROS 2 does not allow, or that is used twice.
@@ -70,9 +71,27 @@ impl Origin {
             ("ranges", &raw.ranges_topic, &part.heard, &|_| has_ranges),
             ("velocities", &raw.velocity_topic, &part.mine, &has_velocity),
         ];
+        let stop =
+            raw.commands.may_stop().then(|| self.names.fleet_topic(&raw.emergency_stop_topic)).transpose()?;
+        // A node without a log may be stopped on its topic; one with a log refuses that when it opens it.
+        let has_log = stop != Some(self.names.topic("/rosout")?);
         let mut uses = Uses::default();
-        if raw.commands.may_stop() {
-            uses.add(self.names.fleet_topic(&raw.emergency_stop_topic)?, "emergency stops", "all robots")?;
+        uses.add_own(
+            &self.names,
+            &[
+                ("~/state", "states", true),
+                // These two are in a recording in any case.
+                ("~/markers", "markers", true),
+                (EVENTS, "events", true),
+                ("/diagnostics", "diagnostics", true),
+                ("/rosout", "log lines", has_log),
+                ("/parameter_events", "changed parameters", raw.serves(RawService::Parameters)),
+                ("~/transition_event", "transitions", raw.serves(RawService::TransitionEvents)),
+                ("/clock", "the time", self.simulated_time),
+            ],
+        )?;
+        if let Some(stop) = stop {
+            uses.add(stop, "emergency stops", "all robots")?;
         }
         for (purpose, pattern, own, is_used) in patterns {
             // Topics below the node are its own alone: other robots' nodes have others.

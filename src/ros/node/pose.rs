@@ -9,6 +9,8 @@ use crate::messages::nav_msgs::Odometry;
 use crate::messages::std_msgs::Header;
 use crate::ros::edge::{Node, Quality, Stamps, Subscription};
 use crate::scene::swarm::raw::{RawNode, RawPoseType};
+use crate::swarm::pace::system_time;
+use crate::swarm::transport::complaints::Complaints;
 use crate::swarm::watch::Pose;
 
 /// Where the members' poses come from.
@@ -16,15 +18,33 @@ pub enum PoseSource {
     Stamped(Vec<(usize, Subscription<PoseStamped>)>),
     WithCovariance(Vec<(usize, Subscription<PoseWithCovarianceStamped>)>),
     Odometry(Vec<(usize, Subscription<Odometry>)>),
-    /// One message for all, in the order of the members; the members whose poses are read.
-    Array(Box<Subscription<PoseArray>>, Vec<usize>),
+    /// One message for all, in the order of the members.
+    Array(Box<PoseArrays>),
+}
+
+/// Poses of all members in one message.
+pub struct PoseArrays {
+    topic: Subscription<PoseArray>,
+    /// Members whose poses are read.
+    heard: Vec<usize>,
+    /// All members \[1\].
+    count: usize,
+    /// Messages with another number of poses: whose they are is not known.
+    misfits: u64,
 }
 
 /// Poses of one member taken in a tick at most: a flood must not hold the loop.
 const MOST_AT_ONCE: usize = 64;
 
 impl PoseSource {
-    pub fn open(node: &Node, raw: &RawNode, heard: &[usize], topic: TopicOf<'_>) -> Result<Self, NodeError> {
+    /// Of the members in `heard`, of `count` in all.
+    pub fn open(
+        node: &Node,
+        raw: &RawNode,
+        heard: &[usize],
+        count: usize,
+        topic: TopicOf<'_>,
+    ) -> Result<Self, NodeError> {
         let members = heard.iter().copied();
         let of = |m| topic(&raw.pose_topic, m);
         Ok(match raw.pose_type {
@@ -33,19 +53,20 @@ impl PoseSource {
             RawPoseType::Odometry => Self::Odometry(each(node, members, of)?),
             RawPoseType::PoseArray => {
                 let topic = node.subscription(&of(0)?, Quality::BEST_EFFORT)?.steady();
-                Self::Array(Box::new(topic), heard.to_vec())
+                Self::Array(Box::new(PoseArrays { topic, heard: heard.to_vec(), count, misfits: 0 }))
             }
         })
     }
 
     /// Passes every pose that arrived since the last call to `hear`, and its message to `recorder` with the loop's
-    /// time, and the frame that the message names. Under simulated time `now` \[s\] is given; it replaces the reception time, which DDS takes from the
-    /// computer's clock.
+    /// time, and the frame that the message names; an array of another length is left out, with a complaint. Under simulated
+    /// time `now` \[s\] is given; it replaces the reception time, which DDS takes from the computer's clock.
     pub fn take(
-        &self,
+        &mut self,
         frame_id: &str,
         now: Option<f64>,
         mut recorder: Option<(&mut MessageRecorder, f64)>,
+        complaints: &mut Complaints,
         hear: &mut dyn FnMut(usize, Pose, &str),
     ) {
         let pose = |header: &Header, one: &geometry_msgs::Pose, stamps: Stamps| {
@@ -61,13 +82,23 @@ impl PoseSource {
             Self::Odometry(all) => {
                 drain(all, |message| (&message.header, &message.pose.pose), pose, (&mut recorder, now), hear);
             }
-            Self::Array(topic, heard) => {
+            Self::Array(arrays) => {
+                let PoseArrays { topic, heard, count, misfits } = &mut **arrays;
                 for (message, stamps) in std::iter::from_fn(|| topic.take()).take(MOST_AT_ONCE) {
                     copy(&mut recorder, topic.topic(), &message, stamps, now);
-                    for &member in heard {
-                        if let Some(one) = message.poses.get(member) {
-                            hear(member, pose(&message.header, one, stamps), &message.header.frame_id);
-                        }
+                    if message.poses.len() != *count {
+                        *misfits += 1;
+                        let text = format_args!(
+                            "{}: {} poses, and the swarm has {count} robots: send one of each, in the order of the swarm file",
+                            topic.topic(),
+                            message.poses.len()
+                        );
+                        complaints.warn("number of poses", 0, system_time(), &text);
+                        continue;
+                    }
+                    for &member in &*heard {
+                        let one = &message.poses[member];
+                        hear(member, pose(&message.header, one, stamps), &message.header.frame_id);
                     }
                 }
             }
@@ -80,17 +111,17 @@ impl PoseSource {
             Self::Stamped(all) => all.iter().map(|(_, topic)| topic.is_left()).collect(),
             Self::WithCovariance(all) => all.iter().map(|(_, topic)| topic.is_left()).collect(),
             Self::Odometry(all) => all.iter().map(|(_, topic)| topic.is_left()).collect(),
-            Self::Array(topic, _) => vec![topic.is_left()],
+            Self::Array(arrays) => vec![arrays.topic.is_left()],
         }
     }
 
-    /// Messages that were no message of the type.
+    /// Messages that were no message of the type, or not of this swarm.
     pub fn refused(&self) -> u64 {
         match self {
             Self::Stamped(all) => all.iter().map(|(_, topic)| topic.refused()).sum(),
             Self::WithCovariance(all) => all.iter().map(|(_, topic)| topic.refused()).sum(),
             Self::Odometry(all) => all.iter().map(|(_, topic)| topic.refused()).sum(),
-            Self::Array(topic, _) => topic.refused(),
+            Self::Array(arrays) => arrays.topic.refused() + arrays.misfits,
         }
     }
 }

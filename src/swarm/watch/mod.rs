@@ -80,6 +80,12 @@ pub struct Watch {
     clock: Option<f64>,
 }
 
+/// Weight of a late pose against one that is accepted \[1\]: one in five may be late for ever.
+const LATE: u32 = 4;
+
+/// Weight of late poses that is worth a warning \[1\]: as many as 25 at once.
+const OFTEN: u32 = 25 * LATE;
+
 #[derive(Clone, Copy, Debug)]
 struct Member {
     health: Health,
@@ -91,6 +97,8 @@ struct Member {
     is_doubted: bool,
     /// Newest pose of a run that is consistent in itself and not yet believed, and how many are in it.
     candidate: Option<(Pose, u32)>,
+    /// Late poses of the last while, by [`LATE`], less the others \[1\].
+    late: u32,
     /// Shortest time between two stamps of late, which is the member's own period \[s\].
     shortest: Option<f64>,
     counts: Counts,
@@ -101,7 +109,8 @@ impl Watch {
     pub fn new(members: usize, limits: WatchLimits) -> Self {
         let (health, counts) = (Health::Waiting, Counts::default());
         let (accepted, place, candidate, shortest) = (None, None, None, None);
-        let member = Member { health, accepted, place, is_doubted: false, candidate, shortest, counts };
+        let member =
+            Member { health, accepted, place, is_doubted: false, candidate, late: 0, shortest, counts };
         Self { limits, members: vec![member; members], ranges: vec![Vec::new(); members], clock: None }
     }
 
@@ -200,14 +209,10 @@ impl Member {
     /// Whether a pose that is good in itself is believed after those before it.
     fn weigh(&mut self, pose: &Pose, now: f64, limits: &WatchLimits) -> Result<(), Rejection> {
         let Some(last) = self.accepted else { return Ok(()) };
-        let (far, allowed) = limits.jump(&last, pose);
-        // Those that bear no stamp have that of their arrival, which several may share.
-        if pose.stamp == last.stamp && pose.stamp < now && far > allowed {
-            return Err(Rejection::TwoAtOnce { distance: far });
-        }
         if pose.stamp <= last.stamp {
-            return Err(Rejection::NotNewer { behind: last.stamp - pose.stamp });
+            return Err(self.reject_late(pose, &last, now, limits));
         }
+        let (far, allowed) = limits.jump(&last, pose);
         let stopped = limits.health(self.age(now)) == Health::Stopped;
         if !stopped && far <= allowed {
             return Ok(());
@@ -219,6 +224,21 @@ impl Member {
             (false, true) => Err(Rejection::Recovering { seen, recover }),
             (false, false) => Err(Rejection::Jump { distance: far, allowed, seen, recover }),
         }
+    }
+
+    /// Why a pose that is not newer than the last is rejected.
+    fn reject_late(&mut self, pose: &Pose, last: &Pose, now: f64, limits: &WatchLimits) -> Rejection {
+        let behind = last.stamp - pose.stamp;
+        let (distance, allowed) = limits.jump(pose, last);
+        // Those that bear no stamp have that of their arrival, which several may share.
+        if (behind > 0.0 || pose.stamp < now) && distance > allowed {
+            return Rejection::TwoAtOnce { distance, behind };
+        }
+        // A network that brings a pose twice has no part in it.
+        if behind > 0.0 {
+            self.late = (self.late + LATE).min(2 * OFTEN);
+        }
+        if self.late < OFTEN { Rejection::NotNewer { behind } } else { Rejection::OftenLate { behind } }
     }
 
     /// Adds a pose to the run of those not yet believed, or begins a new one with it; how many are in it.
@@ -248,6 +268,7 @@ impl Member {
             self.shortest = Some(GROWTH * own);
         }
         self.counts.accepted += 1;
+        self.late = self.late.saturating_sub(1);
         (self.accepted, self.place) = (Some(pose), Some(pose.position));
         (self.candidate, self.is_doubted) = (None, false);
         self.health = limits.health(self.age(now));

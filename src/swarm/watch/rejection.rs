@@ -57,14 +57,26 @@ pub enum Rejection {
         /// How much older than the newest one it is \[s\]; 0 for a copy.
         behind: f64,
     },
-    /// It is of the same time as the newest one, and of another place.
+    /// The same of so many of late that no network explains it.
     #[error(
-        "a pose is of the same time as another and lies {} m from it: two publish the poses of this robot; end one of them",
+        "a pose is stamped {behind:.3} s before the newest one, as many are: two publish the poses of this robot, of which \
+         one has to end, or the network delays each by another time"
+    )]
+    OftenLate {
+        /// How much older than the newest one it is \[s\].
+        behind: f64,
+    },
+    /// It is of the same time as the newest one or of one before, and farther from it than a robot goes meanwhile.
+    #[error(
+        "a pose lies {} m from another, of the same time or {behind:.3} s later: two publish the poses of this robot; end one \
+         of them",
         metres(.distance)
     )]
     TwoAtOnce {
         /// Distance from the other \[m\].
         distance: f64,
+        /// How much older than the other it is \[s\].
+        behind: f64,
     },
     /// It implies a speed that no robot has.
     #[error(
@@ -123,6 +135,7 @@ impl Rejection {
             Rejection::OutOfRange { .. } => Some("out of range"),
             Rejection::FromTheFuture { .. } => Some("from the future"),
             Rejection::TooOld { .. } => Some("too old"),
+            Rejection::OftenLate { .. } => Some("often late"),
             Rejection::TwoAtOnce { .. } => Some("two at once"),
             Rejection::Jump { .. } => Some("jump"),
             Rejection::Contradicted { .. } => Some("contradicted by ranges"),
@@ -150,7 +163,7 @@ pub struct Counts {
     pub from_the_future: u64,
     /// Rejections as [`Rejection::TooOld`].
     pub too_old: u64,
-    /// Rejections as [`Rejection::NotNewer`] and [`Rejection::TwoAtOnce`].
+    /// Rejections as [`Rejection::NotNewer`], [`Rejection::OftenLate`] and [`Rejection::TwoAtOnce`].
     pub not_newer: u64,
     /// Rejections as [`Rejection::Jump`].
     pub jumps: u64,
@@ -189,7 +202,9 @@ impl Counts {
             Rejection::OutOfRange { .. } => &mut self.out_of_range,
             Rejection::FromTheFuture { .. } => &mut self.from_the_future,
             Rejection::TooOld { .. } => &mut self.too_old,
-            Rejection::NotNewer { .. } | Rejection::TwoAtOnce { .. } => &mut self.not_newer,
+            Rejection::NotNewer { .. } | Rejection::OftenLate { .. } | Rejection::TwoAtOnce { .. } => {
+                &mut self.not_newer
+            }
             Rejection::Jump { .. } => &mut self.jumps,
             Rejection::Contradicted { .. } => &mut self.contradicted,
             Rejection::Unconfirmed { .. } => &mut self.unconfirmed,

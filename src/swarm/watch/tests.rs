@@ -89,6 +89,47 @@ fn the_newest_wins_whatever_the_order() {
     assert_eq!((counts.accepted, counts.not_newer), (2, 2));
 }
 
+/// A second sender that is `ahead` \[s\] of the first, and leads the member away from it at `speed` \[m/s\]: the causes of the
+/// rejections, in order.
+fn causes_of_two(ahead: f64, speed: f64, polls: u32) -> Vec<Option<&'static str>> {
+    let mut watch = watch();
+    let mut causes = Vec::new();
+    for k in 0..polls {
+        let now = 1.0 + 0.03 * f64::from(k);
+        let first = watch.receive(0, pose(0.0, now), now);
+        causes.extend(first.err().map(|rejection| rejection.cause()));
+        let second = pose(speed * (now - 1.0), now + ahead);
+        watch.receive(0, second, now).expect("the newest, and not far off");
+    }
+    causes
+}
+
+#[test]
+fn two_that_publish_the_poses_of_one_robot_are_noticed_by_its_places() {
+    let causes = causes_of_two(0.04, 1.0, 40);
+    let begun = causes.iter().position(|cause| *cause == Some("two at once")).expect("noticed");
+    // Beyond 0.12 m at 1 m/s: 0.1 m of slack, and 0.01 s at 2 m/s.
+    assert!((3..8).contains(&begun) && causes[begun..].iter().all(Option::is_some), "{causes:?}");
+}
+
+#[test]
+fn poses_that_come_late_again_and_again_are_worth_a_warning_and_a_few_are_not() {
+    let causes = causes_of_two(0.04, 0.0, 200);
+    let begun = causes.iter().position(|cause| *cause == Some("often late")).expect("noticed");
+    assert!((5..60).contains(&begun), "{begun}");
+    assert!(causes[begun..].iter().all(|cause| *cause == Some("often late")), "{causes:?}");
+    // A network that reorders one in ten, and one that brings all twice.
+    let mut watch = watch();
+    for k in 0..1000 {
+        let now = 1.0 + 0.05 * f64::from(k);
+        let one = pose(0.0, now);
+        watch.receive(0, one, now).expect("the newest");
+        let again = if k % 10 == 9 { pose(0.0, now - 0.05) } else { one };
+        let rejection = watch.receive(0, again, now).expect_err("late");
+        assert_eq!(rejection.cause(), None, "{k}: {rejection}");
+    }
+}
+
 #[test]
 fn poses_of_a_member_that_is_slower_than_the_loop_are_not_lost() {
     // The loop's period is 0.1 s; each row has gaps in periods and what of them is a loss.
