@@ -103,7 +103,7 @@ impl Piece {
     }
 
     /// Both ends, each with the direction from there into the piece, of length 1.
-    pub(crate) fn leaving(&self) -> [(Point, Point); 2] {
+    pub fn leaving(&self) -> [(Point, Point); 2] {
         [(self.from, self.tangent(0.0)), (self.to, self.tangent(1.0).map(|v| -v))]
     }
 

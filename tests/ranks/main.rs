@@ -20,16 +20,22 @@ use flockform::solve::interrupt::Interrupt;
 
 use scenes::{load, planned};
 
+#[cfg(feature = "export")]
 mod averaged;
 mod changed;
+#[cfg(feature = "cli")]
 mod drawn;
+#[cfg(feature = "export")]
 mod increments;
 mod parts;
+#[cfg(feature = "export")]
 mod rest;
 #[path = "../common/scenes.rs"]
 mod scenes;
+#[cfg(feature = "export")]
 mod turned;
 mod weighted;
+#[cfg(feature = "export")]
 mod written;
 
 /// Everything that a run leaves, to the bit.
