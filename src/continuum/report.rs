@@ -54,15 +54,12 @@ impl PlanReport {
         };
         report.capabilities(scene, plan);
         // What an action asks for later is not left out.
-        let (later, left_out) = std::mem::take(&mut report.left_out)
-            .into_iter()
-            .partition(|(key, _)| set_later(scene, key).is_some());
-        report.left_out = left_out;
-        let later = later.into_iter().filter_map(|(key, _): (String, String)| {
-            let (k, at) = set_later(scene, &key)?;
-            Some((format!("{key} from step {at} on"), format!("actions[{k}]")))
-        });
-        report.modelled.extend(later);
+        for (key, because) in std::mem::take(&mut report.left_out) {
+            match set_later(scene, &key) {
+                Some((k, at)) => report.models(format!("{key} from step {at} on"), &format!("actions[{k}]")),
+                None => report.left_out.push((key, because)),
+            }
+        }
         Ok(report)
     }
 

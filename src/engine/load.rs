@@ -26,6 +26,11 @@ impl Load {
         self.ramp
     }
 
+    /// Part of the loads that is on the body at a step, where they grow \[1\].
+    fn ramped(&self, step: usize) -> Option<f64> {
+        self.ramp.map(|ramp| (step as f64 / ramp as f64).min(1.0))
+    }
+
     /// Whether more of the loads is to come after this step.
     pub fn is_growing(&self, step: usize) -> bool {
         self.ramp.is_some_and(|ramp| step < ramp)
@@ -40,17 +45,10 @@ impl Engine {
 
     /// The same at a step that has been taken: a body that has not moved yet bears nothing.
     pub(super) fn load_factor_at(&self, step: usize) -> f64 {
-        match (step, self.load.ramp) {
-            _ if step == self.step => {
-                if self.has_moved() {
-                    self.load.factor
-                } else {
-                    0.0
-                }
-            }
-            (0, _) => 0.0,
-            (_, Some(ramp)) => (step as f64 / ramp as f64).min(1.0),
-            _ => self.load.parts.get(step - 1).copied().unwrap_or(1.0),
+        match step {
+            _ if step == self.step && self.has_moved() => self.load.factor,
+            0 => 0.0,
+            _ => self.load.ramped(step).or(self.load.parts.get(step - 1).copied()).unwrap_or(1.0),
         }
     }
 
@@ -84,8 +82,8 @@ impl Engine {
 
     /// Brings the loads to what they are at this step, where they grow.
     pub(super) fn follow_ramp(&mut self) {
-        if let Some(ramp) = self.load.ramp {
-            self.set_load_factor((self.step as f64 / ramp as f64).min(1.0));
+        if let Some(factor) = self.load.ramped(self.step) {
+            self.set_load_factor(factor);
         }
     }
 }

@@ -1,5 +1,6 @@
 //! What `configure` opens and `cleanup` closes.
 
+use std::path::Path;
 use std::sync::mpsc::{channel, sync_channel};
 
 use flockform::flock::vectors::distance;
@@ -7,12 +8,13 @@ use flockform::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use flockform::messages::flockform_msgs::{FormationState, LoopEvent};
 use flockform::messages::geometry_msgs::PoseStamped;
 use flockform::messages::rcl_interfaces::{Parameter, SetParameters, Settings};
-use flockform::record::replay::replay_file;
+use flockform::record::replay::{Report, replay_file};
 use flockform::record::{About, Reader, Recording, Shared};
 use flockform::ros::edge::Quality;
 use flockform::ros::edge::parameters::Value;
 use flockform::ros::node::{CommandQueue, FormationNode, NodeCommand};
 use flockform::ros::robots::{Layout, RobotNodes};
+use flockform::scene::swarm::Swarm;
 use flockform::swarm::control::{Control, Mode};
 use ros2_client::ServiceMapping;
 
@@ -105,16 +107,35 @@ fn an_emergency_stop_outlasts_cleanup_and_configure() {
     assert_eq!(swarm.node.control().mode(), Mode::EmergencyStopped);
 }
 
+/// Its leaders must move, or a loop that goes on would give the targets of one that begins anew.
+fn led_far() -> Swarm {
+    let legs = "manoeuvres[0].legs=[{ seconds = 20.0, translate = [2.0, 0.5] }]";
+    square(&[&PATIENT[..], &[legs]].concat())
+}
+
+fn begin(path: &Path, about: &About) -> Shared {
+    Shared::new(Recording::create(path, about, false).expect("writable"))
+}
+
+fn finish(recording: &Shared) {
+    recording.take().expect("open").finish().expect("whole");
+}
+
+/// The report of a recording that replays to the bit.
+fn replayed(path: &Path, file: Swarm) -> Report {
+    let report = replay_file(path, Some(file), &[], 0.0).expect("readable");
+    assert!(report.holds(), "{:?}", report.robots);
+    report
+}
+
 #[test]
 fn a_recording_with_a_cleanup_in_it_replays_to_the_bit() {
     let mut peers = peers();
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("flight.mcap");
-    // Its leaders must move, or a loop that goes on would give the targets of one that begins anew.
-    let legs = "manoeuvres[0].legs=[{ seconds = 20.0, translate = [2.0, 0.5] }]";
-    let file = square(&[&PATIENT[..], &[legs]].concat());
+    let file = led_far();
     let about = About { source: "node", ..About::default() };
-    let recording = Shared::new(Recording::create(&path, &about, false).expect("writable"));
+    let recording = begin(&path, &about);
     let mut swarm = Swarming::open(&file, &[]);
     swarm.node.record(recording.sink()).expect("named");
     swarm.until_all_are_heard();
@@ -123,9 +144,8 @@ fn a_recording_with_a_cleanup_in_it_replays_to_the_bit() {
     swarm.until_all_are_heard();
     swarm.fly_until("the leaders are under way again", |swarm| swarm.node.control().program_time() > 0.3);
     drop(swarm);
-    recording.take().expect("open").finish().expect("whole");
-    let report = replay_file(&path, Some(file), &[], 0.0).expect("readable");
-    assert!(report.holds(), "{:?}", report.robots);
+    finish(&recording);
+    let report = replayed(&path, file);
     assert!(report.robots.iter().all(|robot| robot.recorded > 30), "{:?}", report.robots);
 }
 
@@ -134,10 +154,9 @@ fn a_recording_by_a_simulator_s_time_begins_with_that_and_replays_to_the_bit() {
     let _peers = peers();
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("flight.mcap");
-    let legs = "manoeuvres[0].legs=[{ seconds = 20.0, translate = [2.0, 0.5] }]";
-    let file = square(&[&PATIENT[..], &[legs]].concat());
+    let file = led_far();
     let about = About { source: "node", ..About::default() };
-    let recording = Shared::new(Recording::create(&path, &about, false).expect("writable"));
+    let recording = begin(&path, &about);
     let mut node =
         FormationNode::open(&file, &arguments(&["-p", "use_sim_time:=true"]), None).expect("a node");
     node.record(recording.sink()).expect("named");
@@ -156,7 +175,7 @@ fn a_recording_by_a_simulator_s_time_begins_with_that_and_replays_to_the_bit() {
     swarm.fly_until("the leaders are under way", |swarm| swarm.node.control().program_time() > 0.3);
     let last = swarm.robots.fleet().time();
     drop(swarm);
-    recording.take().expect("open").finish().expect("whole");
+    finish(&recording);
     let (mut times, mut kinds) = (Vec::new(), Vec::new());
     let damage = Reader::open(&path).expect("readable").each(&mut |entry| {
         times.push(entry.published);
@@ -171,8 +190,7 @@ fn a_recording_by_a_simulator_s_time_begins_with_that_and_replays_to_the_bit() {
     for kind in [LoopEvent::ACTIVE, LoopEvent::EMERGENCY_STOP, LoopEvent::RESUME, LoopEvent::PARAMETER] {
         assert!(kinds[..first].contains(&kind), "{kind} before the first tick: {kinds:?}");
     }
-    let report = replay_file(&path, Some(file), &[], 0.0).expect("readable");
-    assert!(report.holds(), "{:?}", report.robots);
+    let report = replayed(&path, file);
     assert!(report.robots.iter().all(|robot| robot.recorded > 20), "{:?}", report.robots);
 }
 
@@ -182,8 +200,7 @@ fn a_recording_of_a_process_that_goes_on_where_another_ended_replays_to_the_bit(
     let _peers = peers();
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("flight.2.mcap");
-    let legs = "manoeuvres[0].legs=[{ seconds = 20.0, translate = [2.0, 0.5] }]";
-    let file = square(&[&PATIENT[..], &[legs]].concat());
+    let file = led_far();
     let mut swarm = Swarming::open(&file, &[]);
     swarm.until_all_are_heard();
     swarm.fly_until("the leaders are under way", |swarm| swarm.node.control().program_time() > 0.3);
@@ -197,7 +214,7 @@ fn a_recording_of_a_process_that_goes_on_where_another_ended_replays_to_the_bit(
     drop(swarm);
     let taken_over = Some(kept.control().clone());
     let about = About { source: "node", taken_over, ..About::default() };
-    let recording = Shared::new(Recording::create(&path, &about, false).expect("writable"));
+    let recording = begin(&path, &about);
     let mut swarm = Swarming::open(&file, &[]);
     swarm.node.record(recording.sink()).expect("named");
     swarm.node.restore(kept);
@@ -208,9 +225,8 @@ fn a_recording_of_a_process_that_goes_on_where_another_ended_replays_to_the_bit(
     swarm.until_all_are_heard();
     swarm.fly_until("the leaders go on", |swarm| swarm.node.control().program_time() > 0.6);
     drop(swarm);
-    recording.take().expect("open").finish().expect("whole");
-    let report = replay_file(&path, Some(file), &[], 0.0).expect("readable");
-    assert!(report.holds(), "{:?}", report.robots);
+    finish(&recording);
+    let report = replayed(&path, file);
     assert!(report.robots.iter().all(|robot| robot.recorded > 20), "{:?}", report.robots);
 }
 
@@ -225,15 +241,14 @@ fn a_recording_of_the_node_of_one_robot_replays_to_the_bit() {
     let names = Control::new(&file).expect("valid").formation().names.clone();
     let member = names.last().cloned();
     let about = About { source: "node", member: member.clone(), ..About::default() };
-    let recording = Shared::new(Recording::create(&path, &about, false).expect("writable"));
+    let recording = begin(&path, &about);
     let mut swarm = Swarming::open_for(&file, &[], member.as_deref());
     swarm.node.record(recording.sink()).expect("named");
     swarm.until_all_are_heard();
     swarm.fly_until("it is under way", |swarm| swarm.node.control().program_time() > 1.5);
     drop(swarm);
-    recording.take().expect("open").finish().expect("whole");
-    let report = replay_file(&path, Some(file), &[], 0.0).expect("readable");
-    assert!(report.holds(), "{:?}", report.robots);
+    finish(&recording);
+    let report = replayed(&path, file);
     assert!(report.robots[names.len() - 1].recorded > 20, "{:?}", report.robots);
 }
 
@@ -336,7 +351,7 @@ fn a_recording_s_overrides_name_the_topics_that_the_parameters_gave() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("flight.mcap");
     let about = About { source: "node", ..About::default() };
-    let recording = Shared::new(Recording::create(&path, &about, false).expect("writable"));
+    let recording = begin(&path, &about);
     let (file, given) = (square(&PATIENT), "node.pose_topic=\"{name}/mocap\"");
     let renamed = square(&[&PATIENT[..], &[given]].concat());
     let more = ["-p", "pose_topic:='{name}/mocap'"];
