@@ -185,7 +185,9 @@ fn a_recording_by_a_simulator_s_time_begins_with_that_and_replays_to_the_bit() {
         }
     });
     assert_eq!(damage, None);
-    assert!(times.iter().all(|time| (0.0..=last).contains(time)), "{:?}", times.first());
+    // As stamps are: whole nanoseconds.
+    let outside: Vec<&f64> = times.iter().filter(|time| !(0.0..=last + 0.5e-9).contains(*time)).collect();
+    assert!(outside.is_empty(), "{last} {outside:?}");
     let first = kinds.iter().position(|kind| *kind == LoopEvent::TICK).expect("ticks");
     for kind in [LoopEvent::ACTIVE, LoopEvent::EMERGENCY_STOP, LoopEvent::RESUME, LoopEvent::PARAMETER] {
         assert!(kinds[..first].contains(&kind), "{kind} before the first tick: {kinds:?}");
