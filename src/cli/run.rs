@@ -15,7 +15,7 @@ use flockform::continuum::equilibrium::run_to_equilibrium_shared;
 use flockform::continuum::looks::Looks;
 use flockform::continuum::parts::{Parting, laid_out_whole_for};
 use flockform::continuum::plan::Plan;
-use flockform::continuum::run::{SharedError, StopReason, require_shareable};
+use flockform::continuum::run::{SharedError, StopReason};
 use flockform::continuum::shares::bytes_each;
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
 use flockform::export::figures::is_raster;
@@ -110,10 +110,6 @@ impl Prepared {
         let may_be_parted = |scene: &Scene| team.is_some() && laid_out_whole_for(scene).is_none();
         let parts = |scene: &Scene| if may_be_parted(scene) { team.map_or(1, Team::count) } else { 1 };
         let scene = words_of.load_part(&[], parts)?;
-        // Before a choice, which solves the scene several times.
-        if team.is_some() {
-            require_shareable(&scene)?;
-        }
         if let (Some(team), true) = (team, may_be_parted(&scene)) {
             // What follows all ranks do together.
             begin.agree(arguments.common(&scene))?;

@@ -7,7 +7,7 @@ use crate::engine::Engine;
 use crate::engine::movement::Movement;
 use crate::engine::observer::{EachStep, Observer};
 use crate::engine::several::StepBatch;
-use crate::engine::shared::{Agreed, NotShared};
+use crate::engine::shared::Agreed;
 use crate::engine::state::{EngineState, WrongState};
 use crate::flock::law::Weights;
 use crate::flock::role::Role;
@@ -15,7 +15,7 @@ use crate::flock::rules::{Axis, FeedbackReference, Mean};
 use crate::geometry::point::{dot, minus};
 use crate::ranks::Team;
 use crate::scene::text::number;
-use crate::scene::{Scene, SceneError, Stop};
+use crate::scene::{SceneError, Stop};
 use crate::solve::equilibrium::Solved;
 use crate::sweep::Order;
 
@@ -122,7 +122,7 @@ pub fn run_watched(plan: Plan, observer: &mut dyn Observer) -> Outcome {
 /// sees the whole body, and any of them can break the run off. The state that is gone on from is not seen again.
 ///
 /// # Errors
-/// A sweep that cannot be shared, or a state of another body.
+/// A state of another body.
 pub fn run_shared<'t>(
     plan: Plan,
     from: Option<(EngineState<'_>, f64)>,
@@ -138,7 +138,7 @@ pub fn run_shared<'t>(
     let observer: &mut dyn Observer = match team.into() {
         None => observer,
         Some(team) => {
-            engine.join(team.clone())?;
+            engine.join(team.clone());
             agreed = Agreed { team, own: observer };
             &mut agreed
         }
@@ -150,25 +150,9 @@ pub fn run_shared<'t>(
     Ok(run_loop(engine, begin, &bounds, observer))
 }
 
-/// Whether ranks can share the run of a scene.
-///
-/// # Errors
-/// Names the key that keeps them from it.
-pub fn require_shareable(scene: &Scene) -> Result<(), SceneError> {
-    let help = "run it on one rank, with as many threads as the machine has cores";
-    // A solved body is not swept.
-    if scene.equilibrium.is_none() && scene.update.order == Order::Sequential {
-        return Err(scene.refuse("update.order", NotShared.to_string(), help));
-    }
-    Ok(())
-}
-
-/// The reason why a run cannot be shared.
+/// The reason why a run cannot go on, or not to its equilibrium.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SharedError {
-    /// The sweep.
-    #[error("{0}")]
-    Sweep(#[from] NotShared),
     /// The state that it was to go on from.
     #[error("{0}")]
     State(#[from] WrongState),

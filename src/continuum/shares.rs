@@ -4,7 +4,6 @@ use super::equilibrium::of_plan;
 use super::memory::{iterates_in_parts, readable_bytes, solving, stepped};
 use super::parts::{Parting, laid_out_whole_for};
 use super::plan::Plan;
-use super::run::require_shareable;
 use crate::engine::setup::Setup;
 use crate::engine::several::looks_at_every_step;
 use crate::engine::shared::seen_in_a_step;
@@ -13,8 +12,8 @@ use crate::scene::{Scene, SceneError};
 use crate::solve::corotated::is_corotated;
 use crate::solve::equilibrium::{Request, SolverShares, choose, shared_by};
 use crate::solve::order::outliers_of;
-use crate::sweep::Sweep;
 use crate::sweep::domain::{Domain, Share};
+use crate::sweep::{Order, Sweep};
 
 /// Bytes of a position.
 const PLACE: usize = 16;
@@ -45,7 +44,7 @@ pub enum Exchanged {
         /// Bytes received.
         bytes: usize,
     },
-    /// Nothing but whether to end: each rank solves for the whole body.
+    /// Nothing but whether to end: each rank computes the whole body.
     Interrupts,
 }
 
@@ -176,13 +175,15 @@ impl Shares {
     /// The shares of so many ranks.
     ///
     /// # Errors
-    /// Names the key of a scene that ranks cannot share.
+    /// An equilibrium that the scene cannot have.
     pub fn new(scene: &Scene, plan: &Plan, ranks: usize) -> Result<Self, SceneError> {
-        require_shareable(scene)?;
         if let Some(asked) = &scene.equilibrium {
             return Self::of_solver(scene, &asked.request, plan, ranks);
         }
         let Setup { body, flock, changes, update, roles, present_radius, .. } = &plan.setup;
+        if update.order == Order::Sequential {
+            return Ok(Self::whole(scene, plan, ranks));
+        }
         let share = Share { ranks, ..Share::whole() };
         let sweep = Sweep::compile_share(*update, flock, roles, share);
         let particles = sweep.domain().map_or_else(|| vec![plan.count()], |domain| domain.counts());
@@ -199,9 +200,7 @@ impl Shares {
     }
 
     fn of_solver(scene: &Scene, request: &Request, plan: &Plan, ranks: usize) -> Result<Self, SceneError> {
-        let bytes = bytes_each(scene, plan);
-        let (particles, exchanged) = (vec![plan.count(); ranks], Exchanged::Interrupts);
-        let all = Self { particles, exchanged, bytes };
+        let all = Self::whole(scene, plan, ranks);
         if is_corotated(&plan.setup.flock) {
             return Ok(all);
         }
@@ -211,8 +210,14 @@ impl Shares {
         Ok(shares.map_or(all, |SolverShares { particles, received }| Self {
             particles,
             exchanged: Exchanged::Iterations { bytes: PLACE * received },
-            bytes,
+            bytes: bytes_each(scene, plan),
         }))
+    }
+
+    /// Ranks each of which computes all.
+    fn whole(scene: &Scene, plan: &Plan, ranks: usize) -> Self {
+        let (particles, exchanged) = (vec![plan.count(); ranks], Exchanged::Interrupts);
+        Self { particles, exchanged, bytes: bytes_each(scene, plan) }
     }
 
     /// For the plan: names and values.
@@ -227,7 +232,7 @@ impl Shares {
                 format!("{ranks}, which iterate on {least} to {most} particles each{idle}")
             }
             Exchanged::Interrupts => {
-                format!("{ranks}, each of which solves for all {most}: no faster than one")
+                format!("{ranks}, each of which computes all {most} particles: no faster than one")
             }
             _ => format!("{ranks}, which move {least} to {most} particles each{idle}"),
         };

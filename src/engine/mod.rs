@@ -317,11 +317,11 @@ impl Engine {
         }
         self.move_leaders();
         self.move_components();
-        match self.team {
-            None => {
-                self.sweep.step(&self.flock, self.body.frame.as_ref(), &self.present, &mut self.previous);
-            }
-            Some(_) => self.step_shared(),
+        // A particle that waits for the one before it waits on every rank: each moves all of them.
+        if self.team.is_none() || self.update.order == Order::Sequential {
+            self.sweep.step(&self.flock, self.body.frame.as_ref(), &self.present, &mut self.previous);
+        } else {
+            self.step_shared();
         }
         std::mem::swap(&mut self.present, &mut self.previous);
         self.place_components();

@@ -26,7 +26,7 @@ use crate::flock::vectors::{Vectors, distance};
 use crate::ranks::{Team, added};
 use crate::sweep::caches::Caches;
 use crate::sweep::domain::{Domain, Held, Needs, Share};
-use crate::sweep::{Activity, Order, Stage, Steps};
+use crate::sweep::{Activity, Stage, Steps};
 
 /// The particles whose positions a rank knows, now and before the last step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,22 +39,11 @@ pub(super) enum Known {
     All,
 }
 
-/// A sweep that ranks cannot share.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("a sequential sweep moves one particle after the other and cannot be shared by ranks")]
-pub struct NotShared;
-
 impl Engine {
     /// Shares the body with the other ranks from here on. All ranks must have the same engine, or each that of its part.
-    ///
-    /// # Errors
-    /// A sequential sweep.
-    pub fn join(&mut self, team: Team) -> Result<(), NotShared> {
+    pub fn join(&mut self, team: Team) {
         if team.count() == 1 && self.body.part.is_none() {
-            return Ok(());
-        }
-        if self.update.order == Order::Sequential {
-            return Err(NotShared);
+            return;
         }
         let caches = agreed_caches(&team);
         let part = self.body.part.as_ref().map(Part::held);
@@ -65,7 +54,6 @@ impl Engine {
         self.team = Some((team, share));
         self.release_ghosts();
         self.compile_sweep();
-        Ok(())
     }
 
     /// Makes the positions of all particles, now and before the last step, known to all ranks that share the body; of

@@ -6,7 +6,6 @@ use std::ops::ControlFlow;
 use flockform::Plan;
 use flockform::continuum::digest::fnv1a;
 use flockform::continuum::equilibrium::{run_to_equilibrium, run_to_equilibrium_shared};
-use flockform::continuum::run::require_shareable;
 use flockform::engine::observer::EachStep;
 use flockform::ranks::launcher::place_here;
 use flockform::ranks::mpi::join;
@@ -17,7 +16,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (name, overrides) =
         arguments.split_first().ok_or("name a bundled scene, and overrides of its keys")?;
     let scene = bundled(name).ok_or("there is no such scene")?.load(overrides)?;
-    require_shareable(&scene)?;
     let plan = Plan::new(&scene)?;
     let team = place_here().map(join).transpose()?;
     let mut see = |_: &flockform::Engine, _: f64| ControlFlow::Continue(());

@@ -17,6 +17,7 @@ use super::edge::pulse::Pulse;
 use super::edge::rosout::Rosout;
 use super::edge::{EdgeError, Node, Publisher, Quality, Subscription};
 use super::network;
+use super::node::pose::is_whole;
 use super::node::uses::Uses;
 use super::node::{NodeError, TopicOf, settings};
 use crate::messages::Message;
@@ -39,6 +40,7 @@ use crate::swarm::flight::Fleet;
 use crate::swarm::formation::Formation;
 use crate::swarm::pace::{Pace, system_time};
 use crate::swarm::robots::Robot;
+use crate::swarm::transport::complaints::Complaints;
 use crate::swarm::transport::{RobotsEnd, catch_up, fly};
 use crate::swarm::watch::{Pose, Range};
 
@@ -89,6 +91,8 @@ pub struct Link {
     names: Vec<String>,
     clock: Option<Publisher<Clock>>,
     frame_id: String,
+    /// Of arrays of targets.
+    complaints: Complaints,
     /// Whether a target came since last asked.
     was_sent: bool,
     /// Of the one node, as what follows.
@@ -204,6 +208,7 @@ impl Link {
             names,
             clock,
             frame_id,
+            complaints: Complaints::default(),
             was_sent: false,
             parameters,
             descriptions,
@@ -363,9 +368,12 @@ impl RobotsEnd for Link {
             Targets::Array(topic) => {
                 for (message, _) in std::iter::from_fn(|| topic.take()).take(MOST_AT_ONCE) {
                     self.was_sent = true;
-                    let places = message.poses.iter().map(|pose| [pose.position.x, pose.position.y]);
-                    let known = places.enumerate().take(self.names.len());
-                    known
+                    if !is_whole(&message, self.names.len(), topic.topic(), &mut self.complaints) {
+                        continue;
+                    }
+                    let places =
+                        message.poses.iter().map(|pose| [pose.position.x, pose.position.y]).enumerate();
+                    places
                         .filter(|(_, place)| place.iter().all(|x| x.is_finite()))
                         .for_each(|(m, place)| go(m, place));
                 }

@@ -46,7 +46,11 @@ pub(crate) fn read(path: &Path) -> Result<String> {
     read_at_most(path, MOST_BYTES)
 }
 
-fn read_at_most(path: &Path, most: u64) -> Result<String> {
+/// The same of at most `most` bytes.
+///
+/// # Errors
+/// As [`read`].
+pub(super) fn read_at_most(path: &Path, most: u64) -> Result<String> {
     let mut bytes = Vec::new();
     let length = File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
     if length as u64 > most {

@@ -24,7 +24,10 @@ fn peak(mut child: Child) -> f64 {
 /// Most runs of which one has to take what is predicted.
 const TRIES: u32 = 10;
 
-/// Lines that are off by more than a tenth. On one thread: as many pictures are counted as there are threads, and on a busy computer two
+/// Share of the memory by which a prediction may be off \[1\].
+const MOST_OFF: f64 = 0.1;
+
+/// Lines that are off by more than that. On one thread: as many pictures are counted as there are threads, and on a busy computer two
 /// need not paint their largest at the same moment.
 fn off(scene: &str, sets: &[&str]) -> Vec<String> {
     let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
@@ -44,14 +47,14 @@ fn off(scene: &str, sets: &[&str]) -> Vec<String> {
         let mut found = 0.0_f64;
         // On a busy computer the last of a short process is not seen: what is seen is never more than it takes.
         for _ in 0..TRIES {
-            if found < 0.95 * predicted {
+            if predicted > (1.0 + MOST_OFF) * found {
                 let child = on_one_thread(&run).stdout(Stdio::null()).spawn().expect("starts");
                 found = found.max(peak(child));
             }
         }
         let line = format!("{scene} {key}: {:.1} MB, predicted {:.1}", found / 1e6, predicted / 1e6);
         println!("{line} ({:+.1} %)", 100.0 * (predicted / found - 1.0));
-        if (predicted / found - 1.0).abs() > 0.1 {
+        if (predicted / found - 1.0).abs() > MOST_OFF {
             off.push(line);
         }
     }

@@ -6,12 +6,11 @@ use std::thread;
 
 use flockform::continuum::equilibrium::{run_to_equilibrium_shared, run_to_equilibrium_watched};
 use flockform::continuum::plan::Plan;
-use flockform::continuum::run::{Outcome, SharedError, require_shareable, run_shared};
+use flockform::continuum::run::{Outcome, SharedError, run_shared};
 use flockform::continuum::shares::{Exchanged, Shares};
 use flockform::engine::Engine;
 use flockform::engine::observer::Observer;
 use flockform::engine::probes::ProbeSeries;
-use flockform::engine::shared::NotShared;
 use flockform::engine::state::EngineState;
 use flockform::flock::vectors::Vectors;
 use flockform::ranks::{Exchange, Team, in_process};
@@ -312,8 +311,9 @@ fn many_steps_together_with_halos_of_many_bands_have_the_same_bits() {
 
 #[test]
 fn a_run_goes_on_with_another_number_of_ranks() {
-    for (name, at) in [("tension", 23), ("fracture", 40)] {
-        let scene = load(name, &["stop.steps=60"]);
+    let cases = [("tension", 23, &[][..]), ("fracture", 40, &[]), ("tension", 23, &[SEQUENTIAL_FROM_10])];
+    for (name, at, sets) in cases {
+        let scene = load(name, &[&["stop.steps=60"], sets].concat());
         let (plan, expected) = (planned(&scene), alone(&scene, 1));
         let kept = on_ranks(3, |team| {
             let mut looks = Looks { keep_at: Some(at).filter(|_| team.is_first()), ..Looks::every(1) };
@@ -355,20 +355,19 @@ fn any_rank_can_break_the_run_off_and_all_end_at_the_same_step() {
     assert_eq!(ends, [(12, "interrupted"); 4]);
 }
 
+/// An order in which each particle waits for the one before it, from a step on.
+const SEQUENTIAL_FROM_10: &str =
+    "actions=[{ at = 10, what = { kind = \"set\", keys = [\"update.order='sequential'\"] } }]";
+
 #[test]
-fn what_ranks_cannot_share_is_refused_by_name() {
-    let sequential = load("tension", &["update.order=sequential"]);
-    let refused = require_shareable(&sequential).expect_err("sequential").to_string();
-    assert!(
-        refused.contains("update.order") && refused.contains("one particle after the other"),
-        "{refused}"
-    );
-    let plan = planned(&sequential);
-    let refusals = on_ranks(2, |team| run_shared(plan.clone(), None, &team, &mut Looks::every(1)).err());
-    assert!(refusals.iter().all(|one| *one == Some(SharedError::Sweep(NotShared))), "{refusals:?}");
-    assert!(require_shareable(&load("fracture", &[])).is_ok());
-    // A solved body is not swept.
-    assert!(require_shareable(&load("beam-loaded", &["update.order=sequential"])).is_ok());
+fn sequential_sweeps_have_the_same_bits_on_every_rank_which_each_move_all_particles() {
+    let sequential = ["update.order=sequential", "stop.steps=40"];
+    assert_same("tension", &sequential, 7);
+    assert_same("tension", &["stop.steps=40", SEQUENTIAL_FROM_10], 7);
+    let scene = load("tension", &sequential);
+    let (plan, count) = (planned(&scene), planned(&scene).count());
+    let shares = Shares::new(&scene, &plan, 3).expect("can be shared");
+    assert_eq!((shares.exchanged, shares.particles), (Exchanged::Interrupts, vec![count; 3]));
 }
 
 #[test]

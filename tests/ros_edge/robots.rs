@@ -3,7 +3,8 @@
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-use flockform::messages::geometry_msgs::PoseStamped;
+use flockform::flock::vectors::distance;
+use flockform::messages::geometry_msgs::{Pose, PoseArray, PoseStamped};
 use flockform::messages::rcl_interfaces::{
     GetLoggerLevels, GetParameters, ListParameters, ListParametersRequest, Names,
 };
@@ -64,6 +65,32 @@ fn poses_bear_the_time_at_which_robots_are_there_however_late_the_computer_is() 
     };
     let late = stamps.windows(2).filter(|pair| off(pair) > 0.05).count();
     assert!(stamps.len() >= 60 && late <= 6, "{late} of {}: {stamps:?}", stamps.len());
+}
+
+#[test]
+fn an_array_of_another_number_of_targets_moves_no_robot() {
+    let peers = peers();
+    let sender = peers.theirs.node("/", "sender").expect("a node");
+    let targets = sender.publisher::<PoseArray>("/all/targets", Quality::reliable(1)).expect("out");
+    let file = square(&["node.target_type=\"pose-array\"", "node.target_topic=\"/all/targets\""]);
+    let mut robots = RobotNodes::open(&file, &arguments(&[]), Layout::OneNode).expect("robots");
+    let begun: Vec<[f64; 2]> = robots.fleet().places().iter().collect();
+    // As seen when it has been sent for a while, long enough for it to come.
+    let mut send = |count: usize| {
+        for _ in 0..40 {
+            let poses =
+                (0..count).map(|m| Pose::planar([begun[m % 25][0] + 1.0, begun[m % 25][1]], 0.0)).collect();
+            targets.publish(&PoseArray { poses, ..PoseArray::default() }).expect("sent");
+            std::thread::sleep(Duration::from_millis(5));
+            robots.tick();
+        }
+        let places = robots.fleet().places();
+        places.iter().zip(&begun).map(|(now, then)| distance(now, *then)).fold(0.0, f64::max)
+    };
+    for count in [0, 24, 26] {
+        assert_eq!(send(count), 0.0, "{count} targets of 25 robots");
+    }
+    until("each goes to its own", || ((send(25) - 1.0).abs() < 0.05).then_some(()));
 }
 
 /// Or `ros2 param list` waits five seconds for them.

@@ -509,3 +509,52 @@ fn an_emergency_stop_latches_and_the_programs_wait() {
     fly(&mut flight, 50);
     assert_ne!(flight.fleet().places(), before);
 }
+
+/// It went round the disc for ever, in search of a way to where there is none.
+#[test]
+fn a_robot_whose_goal_the_age_of_a_dead_one_hides_rests_as_near_as_it_may() {
+    // Limits and model, and the distance from the dead one at which each comes to rest: that to be kept, with half a metre by age, or
+    // the place where one that brakes is known to stand.
+    let cases = [
+        ("speed = 1.0", "integrator", 1.0..1.2),
+        ("speed = 0.5", "integrator", 0.75..0.85),
+        ("speed = 1.0\nacceleration = 0.5", "integrator", 1.0..1.2),
+        ("speed = 1.0\nacceleration = 0.5", "double-integrator", 0.5..0.6),
+    ];
+    for ((limits, model, rests), off) in
+        cases.into_iter().flat_map(|case| [0.0, 0.3].map(|off| (case.clone(), off)))
+    {
+        let text = format!(
+            "title = \"Past a dead one\"
+            radius = 0.2
+            robots = [{{ name = \"a\", place = [0.0, 0.0] }}, {{ name = \"b\", place = [3.0, 0.0] }}]
+            leaders = [{{ robots = [\"a\", \"b\"], program = {{ kind = \"manoeuvre\", name = \"on\" }} }}]
+            manoeuvres = [{{ name = \"on\", legs = [{{ seconds = 0.2 }}, {{ seconds = 2.0, translate = [{}, 0.0] }}] }}]
+            links = {{ kind = \"nearest\", count = 1 }}
+            control.period = 0.05
+            flight.model.kind = \"{model}\"
+            flight.faults = [{{ robot = \"b\", at = 0.1, what = {{ kind = \"dead\" }} }}]
+            [limits]
+            clearance = 0.1
+            {limits}",
+            3.0 + off
+        );
+        let mut flight =
+            Flight::new(&parse(&text).unwrap_or_else(|error| panic!("{error}"))).expect("laid out");
+        let mut nearest = f64::INFINITY;
+        let apart = |flight: &Flight| {
+            let places = flight.fleet().places();
+            distance(places.get(0), places.get(1))
+        };
+        for _ in 0..1000 {
+            flight.step();
+            nearest = nearest.min(apart(&flight));
+        }
+        let place = flight.fleet().places().get(0);
+        fly(&mut flight, 100);
+        let moved = distance(flight.fleet().places().get(0), place);
+        assert!(moved < 1e-6, "{limits}, {model}, {off}: {moved} in five seconds");
+        assert!(rests.contains(&apart(&flight)), "{limits}, {model}, {off}: {}", apart(&flight));
+        assert!(nearest > 0.5 - 1e-9, "{limits}, {model}, {off}: {nearest}");
+    }
+}

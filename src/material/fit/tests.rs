@@ -2,6 +2,7 @@ use std::collections::HashMap;
 
 use super::*;
 use crate::flock::lattice::LatticeKind;
+use crate::geometry::piece::Piece;
 use crate::geometry::shape::Shape;
 
 /// Uniform numbers from 0 to 1, the same ones every time.
@@ -150,5 +151,54 @@ fn a_curve_drawn_with_finer_edges_than_the_lattice_has_is_a_curve() {
             fitted.quality().area > 0.39 && (total_area(&fitted) / outline.area() - 1.0).abs() < 0.01,
             "{kind:?}"
         );
+    }
+}
+
+/// Sides that are cut into several pieces, or begin elsewhere, are the same sides.
+#[test]
+fn how_an_outline_is_cut_into_pieces_makes_no_shape_narrow() {
+    let fits = |outline: Outline, spacing: f64| {
+        fit(&Lattice::new(LatticeKind::Square { spacing }, [0.0; 2], 0.0), &outline)
+            .map(|fitted| total_area(&fitted))
+    };
+    let polygon = |corners: &[[f64; 2]]| Outline::of_polygons(&[corners.to_vec()]).expect("an outline");
+    let wedge = [[0.0, 0.0], [10.0, 0.0], [10.0, 3.64]];
+    let more = |extra: &[[f64; 2]]| polygon(&[&wedge, extra].concat());
+    for spacing in [0.25, 0.5] {
+        for outline in [more(&[]), more(&[[1.0, 0.364]]), more(&[[7.0, 2.548], [1.0, 0.364], [0.1, 0.0364]])]
+        {
+            let area = fits(outline, spacing).unwrap_or_else(|error| panic!("{spacing}: {error}"));
+            assert!((area - 18.2).abs() < 1e-9, "{spacing}: {area}");
+        }
+    }
+    // A segment of a circle, its arc in one and in three pieces.
+    let high = 75.0_f64.sqrt();
+    let segment = |angles: &[f64]| {
+        let at = |degrees: f64| [10.0 * degrees.to_radians().cos(), 10.0 * degrees.to_radians().sin() - high];
+        let arcs =
+            angles.windows(2).map(|two| Piece::arc_between(at(two[0]), at(two[1]), [0.0, -high], false));
+        let chord = Piece::edge(at(120.0), at(60.0));
+        Outline::of_shape(&Shape::Path { pieces: std::iter::once(chord).chain(arcs).collect() })
+            .expect("an outline")
+    };
+    for angles in [&[60.0, 120.0][..], &[60.0, 62.0, 118.0, 120.0], &[60.0, 61.0, 90.0, 120.0]] {
+        fits(segment(angles), 0.5).unwrap_or_else(|error| panic!("{angles:?}: {error}"));
+    }
+    // What is narrow between sides that do not meet is so however they are cut.
+    let neck = |cut: &[[f64; 2]]| {
+        let left = [
+            [4.0, 2.2],
+            [0.0, 4.0],
+            [0.0, 0.0],
+            [4.0, 1.8],
+            [6.0, 1.8],
+            [10.0, 0.0],
+            [10.0, 4.0],
+            [6.0, 2.2],
+        ];
+        polygon(&[&left[..], cut].concat())
+    };
+    for cut in [&[][..], &[[5.0, 2.2]], &[[5.5, 2.2], [4.5, 2.2]]] {
+        assert!(matches!(fits(neck(cut), 0.5), Err(FitError::Narrow { .. })), "{cut:?}");
     }
 }

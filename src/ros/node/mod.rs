@@ -11,7 +11,7 @@ mod error;
 mod kept;
 mod link;
 mod origin;
-mod pose;
+pub(super) mod pose;
 pub(super) mod settings;
 mod transitions;
 pub(super) mod uses;

@@ -29,12 +29,24 @@ pub struct PoseArrays {
     heard: Vec<usize>,
     /// All members \[1\].
     count: usize,
-    /// Messages with another number of poses: whose they are is not known.
+    /// Messages with another number of poses.
     misfits: u64,
 }
 
 /// Poses of one member taken in a tick at most: a flood must not hold the loop.
 const MOST_AT_ONCE: usize = 64;
+
+/// Whether an array has a pose of each of `count` robots; complains of one that has not: whose its poses are is not known.
+pub fn is_whole(message: &PoseArray, count: usize, topic: &str, complaints: &mut Complaints) -> bool {
+    let poses = message.poses.len();
+    if poses != count {
+        let text = format_args!(
+            "{topic}: {poses} poses, and the swarm has {count} robots: send one of each, in the order of the swarm file"
+        );
+        complaints.warn("number of poses", 0, system_time(), &text);
+    }
+    poses == count
+}
 
 impl PoseSource {
     /// Of the members in `heard`, of `count` in all.
@@ -86,14 +98,8 @@ impl PoseSource {
                 let PoseArrays { topic, heard, count, misfits } = &mut **arrays;
                 for (message, stamps) in std::iter::from_fn(|| topic.take()).take(MOST_AT_ONCE) {
                     copy(&mut recorder, topic.topic(), &message, stamps, now);
-                    if message.poses.len() != *count {
+                    if !is_whole(&message, *count, topic.topic(), complaints) {
                         *misfits += 1;
-                        let text = format_args!(
-                            "{}: {} poses, and the swarm has {count} robots: send one of each, in the order of the swarm file",
-                            topic.topic(),
-                            message.poses.len()
-                        );
-                        complaints.warn("number of poses", 0, system_time(), &text);
                         continue;
                     }
                     for &member in &*heard {

@@ -87,11 +87,15 @@ pub(super) struct File {
     pub text: String,
 }
 
+/// Bytes of a file of keys at most: it takes some thirty times as much to read, and what is long, places and recordings, has files
+/// of its own.
+const MOST_BYTES: u64 = 32 << 20;
+
 impl File {
     /// # Errors
     /// Why it cannot be read, with `help`.
     pub(super) fn read(path: &Path, help: &str) -> Result<Self, SceneError> {
-        match text::read(path) {
+        match text::read_at_most(path, MOST_BYTES) {
             Ok(text) => Ok(Self::of(path, text)),
             Err(error) => {
                 let message = format!("cannot be read: {error}");

@@ -74,7 +74,7 @@ impl Filter {
         let goal = if !hindered && self.detours[member].is_fresh() {
             open
         } else {
-            self.around(&request, here, member, &mut flags)
+            self.around(seen, &request, member, &mut flags)
         };
         let step = match motion {
             Some(Motion { velocity, .. }) if brakes => {
@@ -187,7 +187,7 @@ impl Filter {
         for k in 0..self.crowd.found.len() {
             let other = self.crowd.found[k] as usize;
             let stray = drift + self.drift(seen, other);
-            let keep = self.radii[member] + self.radii[other] + self.limits.clearance + 2.0 * margin;
+            let keep = self.keep(member, other);
             // Two at the very same place part: the lower number to the left.
             let aside = if member < other { [1.0, 0.0] } else { [-1.0, 0.0] };
             let there = seen.present.get(other);
@@ -273,20 +273,16 @@ impl Filter {
     }
 
     /// The point of the cell to go to: the nearest to the wanted one or, of a detour, to its aim.
-    fn around(
-        &mut self,
-        request: &MotionRequest,
-        here: [f64; 2],
-        member: usize,
-        flags: &mut Flags,
-    ) -> [f64; 2] {
+    fn around(&mut self, seen: &Seen, request: &MotionRequest, member: usize, flags: &mut Flags) -> [f64; 2] {
         let MotionRequest { way, distance, step, reach } = *request;
+        let goal = plus(seen.present.get(member), way);
         let direct = self.cell.nearest(way, reach);
         let size = self.radii[member] + self.limits.clearance;
-        // Nearer to its goal than its own size, a member waits for the one that stands there; as near as solids let it come
-        // to one that they hide, it has arrived.
+        // Nearer to its goal than its own size, a member waits for the one that stands there; as near as solids and lost members
+        // let it come to one that they hide, it has arrived.
         let is_hidden = || {
-            let nearest = self.nearest_to_stand(plus(here, way), member);
+            let lost = self.nearest_to_lost(seen, (goal, reach), member);
+            let nearest = self.nearest_to_stand(goal, member).max(lost);
             nearest > 0.0 && distance <= nearest + ARRIVED * size
         };
         if distance <= size || distance == 0.0 || is_hidden() {
@@ -315,6 +311,30 @@ impl Filter {
         let radius = self.radii[member] + self.limits.margin();
         let obstacles = radius + self.limits.clearance - self.obstacles.distance(place);
         obstacles.max(radius - self.fence.distance(place))
+    }
+
+    /// Distance from a place to the nearest one at which the lost members around this one, which reaches so far \[m\], let it stand,
+    /// as far from them as it is \[m\]; negative where it can stand there.
+    fn nearest_to_lost(&self, seen: &Seen, (place, reach): ([f64; 2], f64), member: usize) -> f64 {
+        let lost = self.crowd.found.iter().map(|&other| other as usize).filter(|&other| !seen.known[other]);
+        let nearest = lost.map(|other| {
+            let keep = self.keep(member, other);
+            let stray =
+                if self.crowd.brakes { 0.0 } else { self.drift(seen, member) + self.drift(seen, other) };
+            let there = seen.present.get(other);
+            // Where the border by age begins to leave it nothing, or as far as it is: inside it comes no nearer to the middle.
+            let least = keep + stray;
+            let border =
+                if stray > 0.0 { f64::hypot(least + 2.0 * reach * stray / least, stray) } else { keep };
+            let disc = border.min(distance(seen.present.get(member), there));
+            (disc - distance(place, there)).max(keep - self.crowd.ways[other].distance(place))
+        });
+        nearest.fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Distance that the places of two members have to keep \[m\].
+    fn keep(&self, member: usize, other: usize) -> f64 {
+        self.radii[member] + self.radii[other] + self.limits.clearance + 2.0 * self.limits.margin()
     }
 
     /// Brings the cell's borders and the end of the way as near as the member can go in a period and brake

@@ -44,6 +44,11 @@ impl Ways {
         self.extent == 0.0
     }
 
+    /// Distance from a place to the hull's rim \[m\].
+    pub fn distance(&self, place: [f64; 2]) -> f64 {
+        edges(&self.corners).map(|edge| length(minus(foot(edge, place), place))).fold(f64::INFINITY, f64::min)
+    }
+
     /// The largest offset of one of its places from the member along `normal` \[m\].
     fn support(&self, normal: [f64; 2]) -> f64 {
         let offset = |corner: &[f64; 2]| dot(normal, minus(*corner, self.way[0]));
