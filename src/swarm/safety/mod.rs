@@ -118,7 +118,7 @@
 //! near each other: their borders follow from their own poses alone.
 //!
 //! It is a filter, not a planner: it goes around what is convex and may wait or wander before what is not.
-//! A member whose goal lies inside a solid, or outside the fence, stays where it is nearest to it.
+//! A member whose goal lies inside a solid, outside the fence, or where a lost member may be, stays where it is nearest to it.
 
 mod braking;
 mod cell;
