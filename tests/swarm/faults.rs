@@ -510,51 +510,63 @@ fn an_emergency_stop_latches_and_the_programs_wait() {
     assert_ne!(flight.fleet().places(), before);
 }
 
+/// A robot with these limits, of this model, after it was sent for so long where another, with a fault, stands, or `off` behind that \[m\]:
+/// its distance from the other in the end, the least on the way, and how far it went in the last five seconds.
+fn sent_to_one_that_stands(fault: &str, (limits, model): (&str, &str), off: f64, seconds: f64) -> [f64; 3] {
+    let text = format!(
+        "title = \"To one that stands\"
+        radius = 0.2
+        robots = [{{ name = \"a\", place = [0.0, 0.0] }}, {{ name = \"b\", place = [3.0, 0.0] }}]
+        leaders = [{{ robots = [\"a\", \"b\"], program = {{ kind = \"manoeuvre\", name = \"on\" }} }}]
+        manoeuvres = [{{ name = \"on\", legs = [{{ seconds = 0.2 }}, {{ seconds = 2.0, translate = [{}, 0.0] }}] }}]
+        links = {{ kind = \"nearest\", count = 1 }}
+        control.period = 0.05
+        flight.model.kind = \"{model}\"
+        flight.faults = [{{ robot = \"b\", at = 0.1, what = {{ kind = \"{fault}\" }} }}]
+        [limits]
+        clearance = 0.1
+        {limits}",
+        3.0 + off
+    );
+    let mut flight = Flight::new(&parse(&text).unwrap_or_else(|error| panic!("{error}"))).expect("laid out");
+    let apart = |flight: &Flight| {
+        let places = flight.fleet().places();
+        distance(places.get(0), places.get(1))
+    };
+    let mut least = f64::INFINITY;
+    while flight.fleet().time() < seconds {
+        flight.step();
+        least = least.min(apart(&flight));
+    }
+    let place = flight.fleet().places().get(0);
+    fly(&mut flight, 100);
+    [apart(&flight), least, distance(flight.fleet().places().get(0), place)]
+}
+
 /// It went round the disc for ever, in search of a way to where there is none.
 #[test]
 fn a_robot_whose_goal_the_age_of_a_dead_one_hides_rests_as_near_as_it_may() {
     // Limits and model, and the distance from the dead one at which each comes to rest: that to be kept, with half a metre by age, or
-    // the place where one that brakes is known to stand.
+    // from the place where one that brakes is known to stand.
     let cases = [
-        ("speed = 1.0", "integrator", 1.0..1.2),
-        ("speed = 0.5", "integrator", 0.75..0.85),
-        ("speed = 1.0\nacceleration = 0.5", "integrator", 1.0..1.2),
-        ("speed = 1.0\nacceleration = 0.5", "double-integrator", 0.5..0.6),
+        (("speed = 1.0", "integrator"), 1.0..1.2),
+        (("speed = 0.5", "integrator"), 0.75..0.85),
+        (("speed = 1.0\nacceleration = 0.5", "integrator"), 1.0..1.2),
+        (("speed = 1.0\nacceleration = 0.5", "double-integrator"), 0.5..0.6),
     ];
-    for ((limits, model, rests), off) in
-        cases.into_iter().flat_map(|case| [0.0, 0.3].map(|off| (case.clone(), off)))
+    for ((robots, rests), off) in cases.into_iter().flat_map(|case| [0.0, 0.3].map(|off| (case.clone(), off)))
     {
-        let text = format!(
-            "title = \"Past a dead one\"
-            radius = 0.2
-            robots = [{{ name = \"a\", place = [0.0, 0.0] }}, {{ name = \"b\", place = [3.0, 0.0] }}]
-            leaders = [{{ robots = [\"a\", \"b\"], program = {{ kind = \"manoeuvre\", name = \"on\" }} }}]
-            manoeuvres = [{{ name = \"on\", legs = [{{ seconds = 0.2 }}, {{ seconds = 2.0, translate = [{}, 0.0] }}] }}]
-            links = {{ kind = \"nearest\", count = 1 }}
-            control.period = 0.05
-            flight.model.kind = \"{model}\"
-            flight.faults = [{{ robot = \"b\", at = 0.1, what = {{ kind = \"dead\" }} }}]
-            [limits]
-            clearance = 0.1
-            {limits}",
-            3.0 + off
-        );
-        let mut flight =
-            Flight::new(&parse(&text).unwrap_or_else(|error| panic!("{error}"))).expect("laid out");
-        let mut nearest = f64::INFINITY;
-        let apart = |flight: &Flight| {
-            let places = flight.fleet().places();
-            distance(places.get(0), places.get(1))
-        };
-        for _ in 0..1000 {
-            flight.step();
-            nearest = nearest.min(apart(&flight));
-        }
-        let place = flight.fleet().places().get(0);
-        fly(&mut flight, 100);
-        let moved = distance(flight.fleet().places().get(0), place);
-        assert!(moved < 1e-6, "{limits}, {model}, {off}: {moved} in five seconds");
-        assert!(rests.contains(&apart(&flight)), "{limits}, {model}, {off}: {}", apart(&flight));
-        assert!(nearest > 0.5 - 1e-9, "{limits}, {model}, {off}: {nearest}");
+        let [apart, least, moved] = sent_to_one_that_stands("dead", robots, off, 50.0);
+        assert!(moved < 1e-6, "{robots:?}, {off}: {moved} in five seconds");
+        assert!(rests.contains(&apart) && least > 0.5 - 1e-9, "{robots:?}, {off}: {apart}, {least}");
+    }
+}
+
+/// The other may leave, and those who swap places have to go round: so it goes round once.
+#[test]
+fn a_robot_whose_goal_another_stands_on_goes_round_it_once_and_waits() {
+    for limits in ["speed = 1.0", "speed = 0.5", "speed = 1.0\nacceleration = 0.5"] {
+        let [apart, least, moved] = sent_to_one_that_stands("stuck", (limits, "integrator"), 0.0, 50.0);
+        assert!(moved < 1e-6 && apart < 0.51 && least > 0.5 - 1e-9, "{limits}: {moved}, {apart}, {least}");
     }
 }

@@ -5,10 +5,13 @@
 //! right-hand rule. Here a blocked member aims to the right of its goal, a quarter turn first and
 //! further back if that does not move it either, until the straight way is free again for as long as
 //! it took to give it up. The aim is projected onto the cell like any other: a detour cannot do harm.
-//! It finds the way round convex things, not out of a maze.
+//! It finds the way round convex things, not out of a maze. A member that has gone once round its goal and not come to it goes no way but
+//! the straight one, until that has brought it nearer or the goal is another: another member may stand on it.
+
+use std::f64::consts::TAU;
 
 use super::cell::length;
-use crate::geometry::point::dot;
+use crate::geometry::point::{cross, dot, minus};
 
 /// Share of the way a member could make in a tick (at most its own size) below which it is blocked \[1\].
 const BLOCKED: f64 = 0.1;
@@ -23,16 +26,25 @@ pub struct Detour {
     ticks: u32,
     /// Eighths of a turn to the right; 0 is straight ahead.
     turn: u8,
-    /// Distance from the goal where the detour began \[m\].
+    /// Distance from the goal where the detour, or the wait, began \[m\].
     begun: f64,
+    /// The goal of the detours so far \[m, world frame\], its place relative to the member at the last tick, and the angle by which the
+    /// member has gone round it since the first one \[rad\].
+    goal: [f64; 2],
+    last: [f64; 2],
+    round: f64,
 }
 
 /// A member's possible and actual motion at a tick; all relative to it.
 #[derive(Clone, Copy, Debug)]
 pub struct Tick {
+    /// Radius and clearance \[m\].
+    pub size: f64,
     /// Largest step in open space \[m\].
     pub scale: f64,
-    /// Its goal \[m\].
+    /// Its goal \[m, world frame\].
+    pub goal: [f64; 2],
+    /// The same, relative to it \[m\].
     pub wanted: [f64; 2],
     /// Distance of the goal \[m\].
     pub distance: f64,
@@ -53,6 +65,11 @@ impl Detour {
         self.turn > 0
     }
 
+    /// Whether it has gone once round the goal.
+    fn waits(self) -> bool {
+        self.round.abs() >= TAU
+    }
+
     /// The aim in place of `wanted` \[m\], relative to the member.
     pub fn aim(self, wanted: [f64; 2]) -> [f64; 2] {
         let angle = -std::f64::consts::FRAC_PI_4 * f64::from(self.turn);
@@ -62,7 +79,23 @@ impl Detour {
 
     /// Takes note of a tick; `patience` is that of [`Limits`](super::Limits).
     pub fn update(&mut self, patience: u32, tick: &Tick) {
-        let Tick { scale, wanted, distance, straight, direct, moved } = *tick;
+        let Tick { size, scale, goal, wanted, distance, straight, direct, moved } = *tick;
+        if self.waits() {
+            if distance < self.begun - size || length(minus(goal, self.goal)) > size {
+                self.reset();
+            }
+            return;
+        }
+        if length(minus(goal, self.goal)) > size {
+            (self.goal, self.round) = (goal, 0.0);
+        } else {
+            self.round += cross(self.last, wanted).atan2(dot(self.last, wanted));
+        }
+        self.last = wanted;
+        if self.waits() {
+            (self.turn, self.ticks, self.begun) = (0, 0, distance);
+            return;
+        }
         let progress = dot(direct, wanted) / (distance * scale);
         // Sliding back to where the detour began is no progress: the way is free that leads straight on,
         // or past something from a place nearer to the goal.
@@ -89,7 +122,7 @@ impl Detour {
 
     /// Whether the state is the initial one.
     pub fn is_fresh(self) -> bool {
-        self.turn == 0 && self.ticks == 0
+        self.turn == 0 && self.ticks == 0 && !self.waits()
     }
 
     pub fn reset(&mut self) {

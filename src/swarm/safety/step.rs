@@ -275,14 +275,14 @@ impl Filter {
     /// The point of the cell to go to: the nearest to the wanted one or, of a detour, to its aim.
     fn around(&mut self, seen: &Seen, request: &MotionRequest, member: usize, flags: &mut Flags) -> [f64; 2] {
         let MotionRequest { way, distance, step, reach } = *request;
-        let goal = plus(seen.present.get(member), way);
+        let place = plus(seen.present.get(member), way);
         let direct = self.cell.nearest(way, reach);
         let size = self.radii[member] + self.limits.clearance;
         // Nearer to its goal than its own size, a member waits for the one that stands there; as near as solids and lost members
         // let it come to one that they hide, it has arrived.
         let is_hidden = || {
-            let lost = self.nearest_to_lost(seen, (goal, reach), member);
-            let nearest = self.nearest_to_stand(goal, member).max(lost);
+            let lost = self.nearest_to_lost(seen, (place, reach), member);
+            let nearest = self.nearest_to_stand(place, member).max(lost);
             nearest > 0.0 && distance <= nearest + ARRIVED * size
         };
         if distance <= size || distance == 0.0 || is_hidden() {
@@ -300,7 +300,7 @@ impl Filter {
         };
         let straight = self.cell.share(shortened(way, scale));
         let direct = shortened(direct, scale);
-        let tick = Tick { scale, wanted: way, distance, straight, direct, moved: goal };
+        let tick = Tick { size, scale, goal: place, wanted: way, distance, straight, direct, moved: goal };
         detour.update(self.limits.patience, &tick);
         goal
     }
