@@ -159,6 +159,15 @@ impl Elastic {
         (slope(highest) / slope(3.0)).max(1.0)
     }
 
+    /// How soft it is in shear along its fibres: `sqrt(E_1 E_2) (1 / G - 2 nu_12 / E_1) / 2`, which is 1 in an isotropic material \[1\].
+    /// The parts of a stress field that fall off fastest and slowest from an edge do so over lengths of about twice this ratio.
+    pub fn softness_in_shear(&self) -> f64 {
+        let Constants::Orthotropic { young: [along, across], poisson_12, shear, .. } = self.constants else {
+            return 1.0;
+        };
+        0.5 * (along * across).sqrt() * (1.0 / shear - 2.0 * poisson_12 / along)
+    }
+
     /// Stiffness against a dilatation averaged over the cells around a particle, instead of that of each cell: Lame's
     /// lambda times the thickness \[force / length\]. `None` where each cell resists its own.
     ///

@@ -433,3 +433,46 @@ fn the_truth_has_lames_stress_on_lines_of_symmetry_at_any_poisson_ratio() {
         }
     }
 }
+
+/// A strip of fabric, clamped and pulled: its edges carry about what it is pulled by, at the clamped end too. In fields that follow the
+/// material's compatibility an error of the shear stress counts as many times as the moduli differ: 0.03 and 0.05 where 0.1 is right, or
+/// -1 in the last case.
+#[test]
+fn the_edges_of_a_strip_soft_in_shear_carry_what_it_is_pulled_by() {
+    let text = r#"
+title = "A strip of fabric, pulled"
+lattice = { kind = "square", spacing = 0.5 }
+body = { shape = { kind = "rectangle", max = [6.0, 4.0] } }
+rule = { mean = { kind = "material" } }
+equilibrium = {}
+record = { places = [[0.5, 0.0], [1.0, 0.0], [3.0, 4.0]] }
+
+[material]
+kind = "orthotropic"
+young = [1000.0, 1000.0]
+poisson_12 = 0.3
+shear = 1.0
+
+[[roles]]
+region = { kind = "edge", side = "left" }
+role = "clamped"
+
+[[loads]]
+kind = "traction"
+region = { kind = "edge", side = "right" }
+traction = [0.1, 0.0]
+"#;
+    for (moduli, off) in [
+        (&["material.shear=20.0"][..], 0.06),
+        (&["material.shear=1.0"], 0.02),
+        (&["material.shear=1.0", "lattice.kind=\"hexagonal\""], 0.03),
+        (&["material.young=[1.0, 100.0]", "material.poisson_12=0.05", "material.shear=0.001"], 0.02),
+    ] {
+        let found = compare_scene(&scene(text, moduli)).unwrap_or_else(|error| panic!("{error}"));
+        for at in &found.places {
+            let (rule, truth) = (at.rule.stress[0], at.truth.stress[0]);
+            println!("{moduli:?} {:+.4} {rule:.5} {truth:.5}", rule / truth - 1.0);
+            assert!((rule / truth - 1.0).abs() < off, "{moduli:?}: {at}");
+        }
+    }
+}

@@ -402,3 +402,37 @@ fn a_lattice_of_robots_takes_the_steps_that_its_rule_can_bear() {
         assert!(damping <= most && damping > 0.4, "{rule}: {damping}");
     }
 }
+
+/// Each step from a noisy pose lost what noise put that back by, and a unicycle turned after it: with 5 mm it went at a sixth of its speed.
+#[test]
+fn declared_noise_slows_no_robot_and_leads_none_aside() {
+    for (model, noise, least, most_aside) in [
+        ("{ kind = \"integrator\" }", 0.02, 7.3, 0.05),
+        ("{ kind = \"integrator\" }", 0.05, 7.3, 0.12),
+        ("{ kind = \"unicycle\", turn_rate = 90.0 }", 0.005, 6.5, 0.02),
+        ("{ kind = \"unicycle\", turn_rate = 90.0 }", 0.02, 5.0, 0.1),
+    ] {
+        for delay in [0, 3] {
+            let text = format!(
+                "title = \"One goes 10 m\"
+                radius = 0.2
+                robots = [{{ name = \"a\", place = [0.0, 0.0] }}, {{ name = \"b\", place = [0.0, 50.0] }}]
+                links = {{ kind = \"nearest\", count = 1 }}
+                leaders = [{{ robots = [\"a\", \"b\"], program = {{ kind = \"path\", points = [{{ at = 1.0, displacement = [10.0, 0.0] }}] }} }}]
+                limits = {{ speed = 0.5, clearance = 0.1 }}
+                control = {{ period = 0.05 }}
+                flight = {{ model = {model}, noise = {noise}, delay = {delay} }}"
+            );
+            let mut flight =
+                Flight::new(&parse(&text).unwrap_or_else(|error| panic!("{error}"))).expect("laid out");
+            let mut aside = 0.0_f64;
+            while flight.fleet().time() < 15.0 {
+                flight.step();
+                aside = aside.max(flight.fleet().places().get(0)[1].abs());
+            }
+            let [along, _] = flight.fleet().places().get(0);
+            assert!(along > least && along < 7.6, "{model}, {noise} m, {delay}: {along} m in 15 s");
+            assert!(aside < most_aside, "{model}, {noise} m, {delay}: {aside} m aside");
+        }
+    }
+}

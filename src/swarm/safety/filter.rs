@@ -194,7 +194,8 @@ impl Filter {
     /// Whether a member is seen where it may be on the way to its last target \[m\].
     pub(super) fn is_on_its_way(&self, seen: &Seen, period: f64, member: usize) -> bool {
         let way = self.longest_way(period + seen.ages[member].max(0.0));
-        distance(seen.present.get(member), self.sent.get(member)) <= way * (1.0 + TOUCHING)
+        distance(seen.present.get(member), self.sent.get(member))
+            <= way * (1.0 + TOUCHING) + 2.0 * self.limits.margin()
     }
 
     /// The speed that the members themselves keep to \[m/s\]: a lower limit of this node brings their targets nearer.
@@ -278,7 +279,7 @@ impl Filter {
         // One that has not come so far, or was carried away, is given its way from where it is seen.
         let age = seen.ages[member].max(0.0);
         let is_near = self.is_on_its_way(seen, period, member);
-        let goes_on = is_near && self.ahead(seen, member) > 0.0;
+        let goes_on = is_near && (self.ahead(seen, member) > 0.0 || self.limits.deviation > 0.0);
         let is_there = is_near || age > (1.0 - TOUCHING) * period || self.limits.deviation > 0.0;
         let has_arrived =
             self.limits.arrives && seen.known[member] && is_there && self.is_inexact(seen, period, member);

@@ -63,9 +63,17 @@ impl Filter {
         }
         let brakes = self.crowd.brakes;
         let motion = self.motion(seen, period, member);
-        let mut request = self.request(motion, way, period, self.ahead(seen, member));
+        let from = self.sent_by_noisy_poses(seen, period, member);
+        let mut request = self.request(motion, way, period, self.ahead(seen, member), from);
         let origins = self.enclose(seen, &mut request, member);
-        let open = shortened(way, request.reach);
+        let open = match from {
+            None => shortened(way, request.reach),
+            Some(from) => {
+                let (on, most) = (minus(way, from), (request.reach - length(from)).max(0.0));
+                let step = shortened(on, if motion.is_some() { most } else { self.limits.speed * period });
+                if step == on { way } else { plus(from, step) }
+            }
+        };
         let mut flags = self.why(open, origins);
         if let Some(Motion { from, .. }) = motion.filter(|_| !brakes) {
             self.leave_room_to_brake(&mut request, from, period, &mut flags);
@@ -96,10 +104,30 @@ impl Filter {
         (target, flags)
     }
 
-    fn request(&self, motion: Option<Motion>, way: [f64; 2], period: f64, ahead: f64) -> MotionRequest {
+    /// Where a member whose poses are noisy was last sent, relative to its pose \[m\], if it is there or on its way there. It is sent on
+    /// from there: each step from its pose would lose what noise puts that back by, and gain nothing where it puts it forward, since
+    /// the member goes no faster, and one that turns first would turn after the noise.
+    fn sent_by_noisy_poses(&self, seen: &Seen, period: f64, member: usize) -> Option<[f64; 2]> {
+        let is_noisy = self.limits.deviation > 0.0 && !self.crowd.brakes;
+        let is_noisy = is_noisy && self.is_on_its_way(seen, period, member);
+        is_noisy.then(|| minus(self.sent.get(member), seen.present.get(member)))
+    }
+
+    fn request(
+        &self,
+        motion: Option<Motion>,
+        way: [f64; 2],
+        period: f64,
+        ahead: f64,
+        from: Option<[f64; 2]>,
+    ) -> MotionRequest {
         let (step, distance) = (self.longest_step(period, ahead), length(way));
         match motion {
-            None => MotionRequest { way, distance, step, reach: distance.min(step) },
+            None => {
+                let off = from.map_or(0.0, length);
+                let step = step.max(off + self.limits.speed * period);
+                MotionRequest { way, distance, step, reach: distance.max(off).min(step) }
+            }
             Some(Motion { from, velocity }) => {
                 let (most, ahead) = (self.limits.acceleration, length(from));
                 // One whose limit has been lowered slows down.
