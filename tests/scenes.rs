@@ -211,6 +211,19 @@ fn a_plan_and_a_run_caution_against_what_does_not_suit_the_body() {
     assert!(dx > 0.0 && dy == 0.0, "{dx} {dy}");
 }
 
+#[test]
+fn a_material_whose_cells_lock_in_shear_is_a_caution() {
+    let is_cautioned = |more: &str| {
+        let more = format!(
+            "[rule]; mean.kind = 'material'; [material]; kind = 'isotropic'; young = 1.0; poisson = {more}"
+        );
+        let scene = pulled([6, 4], 0.1, &more);
+        PlanReport::new(&scene, &planned(&scene)).expect("planned").cautions.join("\n").contains("cells lock")
+    };
+    assert!(is_cautioned("-0.9"));
+    assert!(!is_cautioned("-0.7") && !is_cautioned("-0.9; plane = 'strain'"));
+}
+
 /// The lowest row and its particles' neighbours below zero.
 fn negative(world: &str) -> String {
     format!(

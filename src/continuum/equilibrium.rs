@@ -14,7 +14,7 @@ use crate::engine::setup::Setup;
 use crate::engine::shared::Agreed;
 use crate::engine::state::EngineState;
 use crate::flock::role::Role;
-use crate::flock::rules::Rule;
+use crate::flock::rules::{FeedbackReference, Rule};
 use crate::flock::vectors::{Vectors, distance};
 use crate::ranks::Team;
 use crate::scene::{LoadSteps, Scene, SceneError};
@@ -243,7 +243,12 @@ fn refuse_corotated(scene: &Scene, error: &CorotatedError) -> SceneError {
     let (key, help) = match error {
         CorotatedError::Solve(error) => return refuse(scene, error),
         CorotatedError::DoubleOnly => ("equilibrium.precision", "use \"f64\", or leave the precision out"),
-        CorotatedError::Feedback => ("rule.feedback", "leave it out: it does not move the place of rest"),
+        CorotatedError::Feedback => match scene.feedback.map(|feedback| feedback.reference) {
+            Some(FeedbackReference::Initial) => {
+                ("rule.feedback", "leave [equilibrium] out to step there: it moves the place of rest")
+            }
+            _ => ("rule.feedback", "leave it out: it does not move the place of rest"),
+        },
         CorotatedError::Unsettled { cut_short: 1.., .. } => {
             ("equilibrium.most_iterations", "raise it, leave it out, or take equilibrium.solver = \"direct\"")
         }
@@ -265,6 +270,7 @@ fn refuse(scene: &Scene, error: &SolveError) -> SceneError {
         (SolveError::SinglePrecision { .. }, _) => {
             "use equilibrium.precision = \"f64\", or a larger equilibrium.tolerance"
         }
+        (SolveError::NothingFollows, _) => "let particles follow, or leave [equilibrium] out to step",
         (SolveError::NotPositive { solver: Solver::Direct, .. }, _) => {
             "add supports, or bring the stiffnesses closer together"
         }

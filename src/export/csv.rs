@@ -4,7 +4,8 @@
 //! Ids count from 1, columns and rows from the lowest site, frame included, which is the paper's
 //! numbering; a body given as points has its own ids and order, and no columns; nor have particles along an outline. Stresses (`stress_xx`,
 //! `stress_yy`, `stress_xy`) are along x and y under small rotations; of a corotated rule in axes that turn with the
-//! material, which were along x and y in the reference configuration. Numbers are the shortest that read back as the same.
+//! material, which were along x and y in the reference configuration. `rotation` is in radians.
+//! Numbers are the shortest that read back as the same.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};

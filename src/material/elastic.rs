@@ -53,6 +53,9 @@ pub enum Constants {
 /// 2/3 is as much: Lame's lambda over the shear modulus is the same.
 const LOCKS_ABOVE: f64 = 0.4;
 
+/// Poisson's ratio in plane stress below which cells are cautioned against: see [`Elastic::locks_in_shear`].
+const LOCKS_BELOW: f64 = -0.8;
+
 /// Why constants make no stable material.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ElasticError {
@@ -188,6 +191,12 @@ impl Elastic {
             Constants::Isotropic { poisson, plane: Plane::Stress, .. } => Some(poisson / (1.0 + poisson)),
             Constants::Orthotropic { .. } => None,
         }
+    }
+
+    /// Whether it resists shear so much more than dilatation that cells lock: near nu = -1 in plane stress. In plane
+    /// strain the two stay comparable.
+    pub fn locks_in_shear(&self) -> bool {
+        matches!(self.constants, Constants::Isotropic { poisson, plane: Plane::Stress, .. } if poisson < LOCKS_BELOW)
     }
 
     /// The stiffness less what resists dilatation by [`Elastic::averaged_dilatation`] \[force / length\]: all of it where

@@ -231,8 +231,8 @@ impl Swarm {
         }
         let name = &self.names()[member];
         let message = format!(
-            "robot `{name}` cannot be led to {place:?}: it has no program of kind \"external\", or the place lies \
-             beyond poses.range"
+            "robot `{name}` cannot be led to {place:?}: it has no program of kind \"external\", a manoeuvre \
+             moves it, or the place lies beyond poses.range"
         );
         Err(PyValueError::new_err(message))
     }

@@ -22,6 +22,7 @@ use super::node::uses::Uses;
 use super::node::{NodeError, TopicOf, settings};
 use crate::messages::Message;
 use crate::messages::builtin_interfaces::Time;
+use crate::messages::diagnostic_msgs::DiagnosticArray;
 use crate::messages::flockform_msgs::Ranges;
 use crate::messages::formation::pose::said;
 use crate::messages::formation::ranges;
@@ -93,8 +94,14 @@ pub struct Link {
     frame_id: String,
     /// Of arrays of targets.
     complaints: Complaints,
-    /// Whether a target came since last asked.
-    was_sent: bool,
+    /// Of nodes that need not be active; none where the permissions do not allow it.
+    diagnoses: Option<Subscription<DiagnosticArray>>,
+    /// Name of the swarm, which diagnoses of its nodes bear.
+    swarm: String,
+    /// Whether a target has come.
+    has_been_sent: bool,
+    /// Whether a target, or a diagnosis once targets have come, came since last asked.
+    hears_any: bool,
     /// Of the one node, as what follows.
     parameters: Option<Parameters>,
     descriptions: Option<TypeDescriptions>,
@@ -160,6 +167,7 @@ impl Link {
             &[
                 ("/tf", "frames", true),
                 ("/rosout", "log lines", true),
+                ("/diagnostics", "diagnostics", true),
                 ("/parameter_events", "changed parameters", is_served),
                 ("/clock", "the time", publishes_clock),
             ],
@@ -209,7 +217,10 @@ impl Link {
             clock,
             frame_id,
             complaints: Complaints::default(),
-            was_sent: false,
+            diagnoses: first.subscription(&first.topic("/diagnostics")?, Quality::reliable(5)).ok(),
+            swarm: swarm.name.clone(),
+            has_been_sent: false,
+            hears_any: false,
             parameters,
             descriptions,
             loggers: None,
@@ -256,8 +267,8 @@ impl RobotNodes {
             }
             self.tick();
             if let Some(pulse) = &self.pulse {
-                let was_sent = std::mem::take(&mut self.link.was_sent);
-                pulse.note_peers(was_sent, || self.link.targets.left());
+                let hears_any = std::mem::take(&mut self.link.hears_any);
+                pulse.note_peers(hears_any, || self.link.targets.left());
             }
             if self.pulse.as_ref().is_some_and(|pulse| pulse.is_given_up()) {
                 return false;
@@ -360,14 +371,14 @@ impl RobotsEnd for Link {
             Targets::Stamped(all) => {
                 for (member, topic) in all.iter().enumerate() {
                     if let Some((message, _)) = topic.take_last() {
-                        self.was_sent = true;
+                        self.hears_any = true;
                         go(member, [message.pose.position.x, message.pose.position.y]);
                     }
                 }
             }
             Targets::Array(topic) => {
                 for (message, _) in std::iter::from_fn(|| topic.take()).take(MOST_AT_ONCE) {
-                    self.was_sent = true;
+                    self.hears_any = true;
                     if !is_whole(&message, self.names.len(), topic.topic(), &mut self.complaints) {
                         continue;
                     }
@@ -378,6 +389,13 @@ impl RobotsEnd for Link {
                         .for_each(|(m, place)| go(m, place));
                 }
             }
+        }
+        self.has_been_sent |= self.hears_any;
+        // A node that is not active sends no targets, and is there all the same.
+        let diagnoses = self.diagnoses.iter().flat_map(|topic| std::iter::from_fn(|| topic.take()));
+        for (message, _) in diagnoses.take(MOST_AT_ONCE) {
+            let is_ours = message.status.iter().any(|status| status.hardware_id == self.swarm);
+            self.hears_any |= self.has_been_sent && is_ours;
         }
     }
 

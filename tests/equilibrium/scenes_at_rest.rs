@@ -249,7 +249,23 @@ fn what_has_no_equilibrium_to_solve_for_is_refused_with_its_place() {
             vec!["equilibrium={solver=\"multigrid\",precision=\"f32\"}", MATERIAL, CELLS, COROTATED],
             "in double precision",
         ),
-        (vec![asked, MATERIAL, CELLS, COROTATED, "rule.feedback={factor=-0.1}"], "rule.feedback"),
+        (
+            vec![asked, MATERIAL, CELLS, COROTATED, "rule.feedback={factor=-0.1}"],
+            "leave [equilibrium] out to step there",
+        ),
+        (
+            vec![asked, MATERIAL, CELLS, COROTATED, "rule.feedback={factor=-0.1,reference=\"previous\"}"],
+            "leave it out: it does not move",
+        ),
+        (
+            vec![asked, MATERIAL, CELLS, BY_MATERIAL, "roles=[{region={kind=\"all\"},role=\"clamped\"}]"],
+            "let particles follow, or leave [equilibrium] out",
+        ),
+        (
+            vec!["equilibrium={solver=\"direct\"}", "roles=[{region={kind=\"all\"},role=\"clamped\"}]"],
+            "let particles follow, or leave [equilibrium] out",
+        ),
+        (vec!["neighbours={kind=\"offsets\",offsets=[[1,0],[0,1],[1,0]]}"], "neighbours.offsets[2]"),
         (vec![asked, "roles[0].from=7"], "roles[0].from"),
         (vec![asked, "fracture={stretch=2.0}"], "fracture"),
         (vec![asked, "roles=[]"], "held"),

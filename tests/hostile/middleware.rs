@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use flockform::flock::vectors::distance;
 use flockform::messages::flockform_msgs::FormationState;
 use flockform::messages::geometry_msgs::{PoseStamped, Twist};
+use flockform::messages::lifecycle_msgs::{ChangeState, ChangeStateRequest, Transition};
 use flockform::messages::std_msgs::Empty;
 use flockform::messages::std_srvs;
 use flockform::ros::edge::{Edge, Node, Quality, Subscription};
@@ -355,6 +356,38 @@ fn robots_whose_node_has_taken_leave_wait_for_another_and_a_node_for_other_robot
     assert!(said.iter().any(|line| line.contains("all peers have left")), "{said:#?}");
     assert!(!said.iter().any(|line| ended.iter().any(|words| line.contains(words))), "{said:#?}");
     assert_eq!(scene.node.terminate(), Some(0));
+}
+
+#[test]
+fn robots_whose_node_is_not_active_or_not_even_configured_wait_for_it() {
+    let mut peers = peers::peers();
+    let domain = peers::domain();
+    let mut judge = Judge::sit(&peers.theirs, &LONG);
+    let mut robots = Running::start(&mut command(domain, &arguments("robots", &LONG)));
+    let lines = robots.lines();
+    let node = Running::start(&mut command(domain, &arguments("node", &LONG)));
+    assert!(judge.until_all_are_sent().is_finite());
+    let change =
+        peers::client::<ChangeState>(&mut peers, ServiceMapping::Enhanced, "/flockform/change_state");
+    let make = |judge: &mut Judge, label: &str| {
+        let transition = Transition { id: 0, label: label.into() };
+        let request = ChangeStateRequest { transition };
+        assert!(peers::call::<ChangeState>(&change, &request, &mut || judge.look()).success, "{label}");
+        judge.during(SILENCE, || ());
+    };
+    for label in ["deactivate", "cleanup", "configure", "activate"] {
+        make(&mut judge, label);
+    }
+    assert!(judge.until_all_are_sent().is_finite());
+    let said: Vec<String> = lines.try_iter().collect();
+    assert!(!said.iter().any(|line| line.contains("given up")), "{said:#?}");
+    // One that dies without a word is missed all the same, active or not.
+    make(&mut judge, "deactivate");
+    let worker = node.worker().expect("a worker");
+    signal("STOP", node.0.id());
+    signal("KILL", worker);
+    until("robots that give up", || lines.try_iter().find(|line| line.contains("given up")));
+    assert_eq!(robots.terminate(), Some(0));
 }
 
 #[test]

@@ -44,7 +44,7 @@ fn a_fleet_in_arrays_has_two_endpoints_of_data_and_services_that_were_asked_for(
     let graph = Peer::start("graph.py", domain, "");
     let mut robots = square.start(domain, "robots", &[]);
     let writers = ["ros_discovery_info", "rt/poses", "rt/rosout", "rt/tf"];
-    has(&graph, &writers, &["ros_discovery_info", "rt/target_poses"]);
+    has(&graph, &writers, &["ros_discovery_info", "rt/diagnostics", "rt/target_poses"]);
     assert_eq!(robots.terminate(), Some(0));
     graph.until("the leave", |line| topics(line, "writers").is_empty().then_some(()));
     let _node = square.start(domain, "node", &[]);

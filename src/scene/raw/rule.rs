@@ -31,7 +31,7 @@ pub enum RawNeighbours {
     Collinear {},
     /// The sites at these offsets in columns and rows of the lattice.
     Offsets {
-        /// Pairs of whole numbers, in the order of summation.
+        /// Pairs of whole numbers, none twice, in the order of summation.
         #[schemars(length(min = 1), inner(inner(range(min = -1000, max = 1000))))]
         offsets: Vec<[i32; 2]>,
     },
@@ -247,6 +247,7 @@ pub enum RawOrder {
     /// All particles use the old positions (the paper).
     #[default]
     Synchronous,
-    /// Each uses the new positions of the particles numbered before it, and of all leaders, which move first.
+    /// Each uses the new positions of the particles numbered before it, and of all leaders, which move first. A body of points is
+    /// numbered anew for this, by place: in columns along the shorter side of its bounds, each from its lower end.
     Sequential,
 }

@@ -350,12 +350,21 @@ fn frame(raw: RawFrame) -> Option<FrameRule> {
     }
 }
 
-/// A particle would be a neighbour of itself by such an offset.
+/// A particle would be a neighbour of itself, or of another twice, by such an offset.
 fn require_others(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
     let Some(RawNeighbours::Offsets { offsets }) = &raw.neighbours else { return Ok(()) };
-    let Some(k) = offsets.iter().position(|offset| *offset == [0, 0]) else { return Ok(()) };
-    let message = "[0, 0] is the particle itself, which is not its own neighbour".into();
-    Err(refuse(&format!("neighbours.offsets[{k}]"), message, "leave it out"))
+    for (k, offset) in offsets.iter().enumerate() {
+        let (message, help) = if *offset == [0, 0] {
+            ("[0, 0] is the particle itself, which is not its own neighbour".into(), "leave it out")
+        } else if let Some(first) = offsets[..k].iter().position(|earlier| earlier == offset) {
+            let help = "name it once; rule.weights of kind \"list\" let a neighbour count for more";
+            (format!("the particle of neighbours.offsets[{first}] again"), help)
+        } else {
+            continue;
+        };
+        return Err(refuse(&format!("neighbours.offsets[{k}]"), message, help));
+    }
+    Ok(())
 }
 
 fn neighbourhood(raw: &RawNeighbours, lattice: &Lattice, elastic: Option<&Elastic>) -> Neighbourhood {

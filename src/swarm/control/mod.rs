@@ -299,10 +299,11 @@ impl Control {
         })
     }
 
-    /// Gives a leader that is moved from outside its next place \[m\]; false if it is not one, or the place lies
-    /// where no pose would be believed.
+    /// Gives a leader that is moved from outside its next place \[m\]; false if it is not one, a manoeuvre moves it, or the
+    /// place lies where no pose would be believed.
     pub fn place_leader(&mut self, member: usize, place: [f64; 2]) -> bool {
-        self.is_believed(place) && self.formation.place_leader(member, place)
+        let now = self.program_time();
+        self.is_believed(place) && self.formation.place_leader(member, place, now)
     }
 
     /// As [`Control::place_leader`], for any leader, whose own program ends with this.

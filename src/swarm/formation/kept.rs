@@ -147,6 +147,39 @@ mod tests {
         assert!(nearest >= 0.7 - 1e-9 && places[0][0] > 0.5, "{nearest} m, {places:?}");
     }
 
+    /// In a loop that goes on from another too, which the two then leave in the same place.
+    #[test]
+    fn leaders_from_outside_are_placed_again_once_a_manoeuvre_has_ended() {
+        let text = "title = \"two\"\nradius = 0.2\nlinks = { kind = \"nearest\", count = 1 }\n\
+                    robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [0.0, 4.0] }]\n\
+                    leaders = [{ robots = [\"a\"], program = { kind = \"external\" } }]\n\
+                    manoeuvres = [{ name = \"on\", legs = [{ seconds = 2.0, translate = [1.0, 0.0] }] }]\n\
+                    limits = { speed = 1.0, clearance = 0.3 }\n";
+        let swarm =
+            Swarm::parse("two", "two.toml", text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+        let mut control = Control::new(&swarm).expect("valid");
+        fly(&mut control, 0..10);
+        let on = control.formation().manoeuvre("on", control.program_time()).expect("in the file");
+        control.begin(&on);
+        fly(&mut control, 10..20);
+        assert!(!control.place_leader(0, [3.0, 0.0]), "under way");
+        let mut another = Control::new(&swarm).expect("valid");
+        another.restore(control.kept());
+        assert!(!another.place_leader(0, [3.0, 0.0]), "under way");
+        assert_eq!(another.formation().moved().collect::<Vec<_>>(), [0], "its topic is heard");
+        let led = |control: &Control| control.formation().led_to(0, control.program_time());
+        for control in [&mut control, &mut another] {
+            fly(control, 20..100);
+            assert_eq!(led(control), Some([1.0, 0.0]), "where it was left");
+            assert!(control.place_leader(0, [3.0, 0.0]));
+            assert!(!control.place_leader(1, [3.0, 4.0]), "it follows");
+            assert_eq!(led(control), Some([3.0, 0.0]));
+        }
+        let mut third = Control::new(&swarm).expect("valid");
+        third.restore(control.kept());
+        assert_eq!(led(&third), Some([3.0, 0.0]));
+    }
+
     #[test]
     fn a_loop_goes_on_where_another_ended() {
         let swarm = bundled_swarm("square").expect("bundled").load_swarm(&[]).expect("valid");

@@ -183,6 +183,7 @@ fn formation(
     let mut formation = Formation {
         radii: vec![swarm.raw.radius; names.len()],
         leads: vec![None; names.len()],
+        is_moved: vec![false; names.len()],
         entries: vec![None; names.len()],
         spacing: spacing_of(&places),
         manoeuvres: swarm.manoeuvres.clone(),

@@ -44,6 +44,8 @@ pub struct Formation {
     /// Manoeuvres that can be flown, as the file gives them.
     pub manoeuvres: Vec<NamedManoeuvre>,
     leads: Vec<Option<Lead>>,
+    /// Leaders that the file has moved from outside, whatever moves them at present.
+    is_moved: Vec<bool>,
     /// The entry of the file that leads each member.
     entries: Vec<Option<usize>>,
     course: TargetSource,
@@ -181,20 +183,25 @@ impl Formation {
         }
     }
 
-    /// Leaders that are moved from outside.
+    /// Leaders that the file has moved from outside.
     pub fn moved(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.count()).filter(|&m| matches!(self.leads[m], Some(Lead::External(_))))
+        (0..self.count()).filter(|&m| self.is_moved[m])
     }
 
-    /// Gives a leader that is moved from outside a new place \[m\]; false for any other member.
-    pub fn place_leader(&mut self, member: usize, place: [f64; 2]) -> bool {
-        match &mut self.leads[member] {
-            Some(Lead::External(moved)) => {
-                *moved = place;
-                true
-            }
-            _ => false,
+    /// Gives a leader that is moved from outside a new place \[m\] at `now` \[s\]; false for any other member, and during a
+    /// manoeuvre.
+    pub fn place_leader(&mut self, member: usize, place: [f64; 2], now: f64) -> bool {
+        if let Some(Lead::External(moved)) = &mut self.leads[member] {
+            *moved = place;
+            return true;
         }
+        self.is_moved[member] && !self.is_on_manoeuvre(member, now) && self.take_over(member, place, now)
+    }
+
+    /// Whether a manoeuvre moves a leader at `now` \[s\].
+    pub(in crate::swarm) fn is_on_manoeuvre(&self, member: usize, now: f64) -> bool {
+        matches!(&self.leads[member],
+            Some(Lead::Manoeuvre { manoeuvre, since }) if now < since + manoeuvre.duration())
     }
 
     /// Sends a leader to a place \[m\] from `now` \[s\] on, moved from outside; false for a member that no program of the swarm
@@ -217,6 +224,7 @@ impl Formation {
         let split =
             |lead: Option<(usize, Lead)>| lead.map_or((None, None), |(k, lead)| (Some(k), Some(lead)));
         (self.entries, self.leads) = leads.into_iter().map(split).unzip();
+        self.is_moved = self.leads.iter().map(|lead| matches!(lead, Some(Lead::External(_)))).collect();
     }
 
     /// Whether a program of the swarm leads a member.

@@ -125,10 +125,13 @@ pub fn listen<E: ControllerEnd>(control: &mut Control, end: &mut E, complaints: 
         Received::Leader(member, place) => {
             if !control.place_leader(member, place) {
                 let name = &control.formation().names[member];
-                let text = format_args!(
-                    "{name}: a place to lead it to is not finite, farther from the centre than `poses.range` \
-                     allows, or for a robot without an external program"
-                );
+                let why = if control.formation().is_on_manoeuvre(member, control.program_time()) {
+                    "came while a manoeuvre moves the leaders: send places again when it has ended"
+                } else {
+                    "is not finite, farther from the centre than `poses.range` allows, or for a robot without an \
+                     external program"
+                };
+                let text = format_args!("{name}: a place to lead it to {why}");
                 complaints.warn("leader's place", member, system_time(), &text);
             }
         }

@@ -24,7 +24,7 @@ pub struct RawLeaders {
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum RawProgram {
     /// Moved from outside: by topic (`node.leader_topic`) or by the service `set_formation`; holds its place until
-    /// then.
+    /// then. During a manoeuvre no place is taken by topic.
     External {},
     /// Along displacements from its place in the formation.
     Path {
