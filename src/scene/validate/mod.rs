@@ -8,6 +8,7 @@ mod material;
 mod points;
 pub(super) mod roles;
 
+use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -353,10 +354,11 @@ fn frame(raw: RawFrame) -> Option<FrameRule> {
 /// A particle would be a neighbour of itself, or of another twice, by such an offset.
 fn require_others(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
     let Some(RawNeighbours::Offsets { offsets }) = &raw.neighbours else { return Ok(()) };
+    let mut named = HashMap::new();
     for (k, offset) in offsets.iter().enumerate() {
         let (message, help) = if *offset == [0, 0] {
             ("[0, 0] is the particle itself, which is not its own neighbour".into(), "leave it out")
-        } else if let Some(first) = offsets[..k].iter().position(|earlier| earlier == offset) {
+        } else if let Some(first) = named.insert(offset, k) {
             let help = "name it once; rule.weights of kind \"list\" let a neighbour count for more";
             (format!("the particle of neighbours.offsets[{first}] again"), help)
         } else {
