@@ -562,7 +562,7 @@ fn a_robot_whose_goal_the_age_of_a_dead_one_hides_rests_as_near_as_it_may() {
     }
 }
 
-/// The other may leave, and those who swap places have to go round: so it goes round once.
+/// The other may leave, and robots that swap places have to go round: so it goes round once, and again after minutes.
 #[test]
 fn a_robot_whose_goal_another_stands_on_goes_round_it_once_and_waits() {
     for limits in ["speed = 1.0", "speed = 0.5", "speed = 1.0\nacceleration = 0.5"] {

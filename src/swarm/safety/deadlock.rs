@@ -5,8 +5,9 @@
 //! right-hand rule. Here a blocked member aims to the right of its goal, a quarter turn first and
 //! further back if that does not move it either, until the straight way is free again for as long as
 //! it took to give it up. The aim is projected onto the cell like any other: a detour cannot do harm.
-//! It finds the way round convex things, not out of a maze. A member that has gone once round its goal and not come to it goes no way but
-//! the straight one, until that has brought it nearer or the goal is another: another member may stand on it.
+//! It finds the way round convex things, not out of a maze. A member that has gone once round its goal and not come to it, because
+//! another stands on it, say, goes no way but the straight one until that has brought it nearer, the goal is another, or a thousand times as
+//! long.
 
 use std::f64::consts::TAU;
 
@@ -18,6 +19,9 @@ const BLOCKED: f64 = 0.1;
 
 /// The same, above which its way is free \[1\].
 const FREE: f64 = 0.5;
+
+/// Ticks for which a member waits that has gone once round its goal, over those for which it is blocked before a detour \[1\].
+const WAIT: u32 = 1000;
 
 /// One member's memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -81,7 +85,9 @@ impl Detour {
     pub fn update(&mut self, patience: u32, tick: &Tick) {
         let Tick { size, scale, goal, wanted, distance, straight, direct, moved } = *tick;
         if self.waits() {
-            if distance < self.begun - size || length(minus(goal, self.goal)) > size {
+            self.ticks += 1;
+            let is_over = self.ticks / WAIT >= patience;
+            if is_over || distance < self.begun - size || length(minus(goal, self.goal)) > size {
                 self.reset();
             }
             return;
