@@ -191,7 +191,7 @@ impl Filter {
         way + if time > after { speed * (time - after) } else { 0.0 }
     }
 
-    /// Whether a member is seen where it may be on the way to its last target \[m\].
+    /// Whether a member is seen where it may be on the way to its last target, or as far from there as noise may have it \[m\].
     pub(super) fn is_on_its_way(&self, seen: &Seen, period: f64, member: usize) -> bool {
         let way = self.longest_way(period + seen.ages[member].max(0.0));
         distance(seen.present.get(member), self.sent.get(member))
