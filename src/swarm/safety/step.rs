@@ -66,21 +66,13 @@ impl Filter {
         let from = self.sent_by_noisy_poses(seen, period, member);
         let mut request = self.request(motion, way, period, self.ahead(seen, member), from);
         let origins = self.enclose(seen, &mut request, member);
-        let open = match from {
-            None => shortened(way, request.reach),
-            Some(from) => {
-                let (on, most) = (minus(way, from), (request.reach - length(from)).max(0.0));
-                let step = shortened(on, if motion.is_some() { most } else { self.limits.speed * period });
-                if step == on { way } else { plus(from, step) }
-            }
-        };
-        let mut flags = self.why(open, origins);
+        let mut flags = self.why(self.open(&request, (from, motion.is_some()), period), origins);
         if let Some(Motion { from, .. }) = motion.filter(|_| !brakes) {
             self.leave_room_to_brake(&mut request, from, period, &mut flags);
         }
-        let hindered = flags != Flags::default() || motion.is_some();
+        let hindered = flags != Flags::default() || (motion.is_some() && from.is_none());
         let goal = if !hindered && self.detours[member].is_fresh() {
-            open
+            self.open(&request, (from, motion.is_some()), period)
         } else {
             self.around(seen, &request, member, &mut flags)
         };
@@ -111,6 +103,19 @@ impl Filter {
         let is_noisy = self.limits.deviation > 0.0 && !self.crowd.brakes;
         let is_noisy = is_noisy && self.is_on_its_way(seen, period, member);
         is_noisy.then(|| minus(self.sent.get(member), seen.present.get(member)))
+    }
+
+    /// The end of a member's way in open space, relative to its pose \[m\]; `from` where it was last sent by noisy poses.
+    fn open(
+        &self,
+        request: &MotionRequest,
+        (from, is_moving): (Option<[f64; 2]>, bool),
+        period: f64,
+    ) -> [f64; 2] {
+        let Some(from) = from else { return shortened(request.way, request.reach) };
+        let (on, most) = (minus(request.way, from), (request.reach - length(from)).max(0.0));
+        let step = shortened(on, if is_moving { most } else { self.limits.speed * period });
+        if step == on { request.way } else { plus(from, step) }
     }
 
     fn request(
