@@ -70,9 +70,17 @@ impl Filter {
         if let Some(Motion { from, .. }) = motion.filter(|_| !brakes) {
             self.leave_room_to_brake(&mut request, from, period, &mut flags);
         }
-        let hindered = flags != Flags::default() || (motion.is_some() && from.is_none());
+        let open = self.open(&request, (from, motion.is_some()), period);
+        let hindered = match from {
+            // With room to brake the cell is smaller.
+            Some(_) => {
+                flags.0 |= self.why(open, origins).0;
+                flags != Flags::default()
+            }
+            None => flags != Flags::default() || motion.is_some(),
+        };
         let goal = if !hindered && self.detours[member].is_fresh() {
-            self.open(&request, (from, motion.is_some()), period)
+            open
         } else {
             self.around(seen, &request, member, &mut flags)
         };
