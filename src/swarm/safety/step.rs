@@ -63,22 +63,22 @@ impl Filter {
         }
         let brakes = self.crowd.brakes;
         let motion = self.motion(seen, period, member);
-        let from = self.sent_by_noisy_poses(seen, period, member);
+        let from = self.sent_by_noisy_poses(seen, period, member).filter(|_| motion.is_none());
         let mut request = self.request(motion, way, period, self.ahead(seen, member), from);
         let origins = self.enclose(seen, &mut request, member);
-        let mut flags = self.why(self.open(&request, (from, motion.is_some()), period), origins);
+        let open = match from {
+            None => shortened(way, request.reach),
+            Some(from) => {
+                let on = minus(way, from);
+                let step = shortened(on, self.limits.speed * period);
+                if step == on { way } else { plus(from, step) }
+            }
+        };
+        let mut flags = self.why(open, origins);
         if let Some(Motion { from, .. }) = motion.filter(|_| !brakes) {
             self.leave_room_to_brake(&mut request, from, period, &mut flags);
         }
-        let open = self.open(&request, (from, motion.is_some()), period);
-        let hindered = match from {
-            // With room to brake the cell is smaller.
-            Some(_) => {
-                flags.0 |= self.why(open, origins).0;
-                flags != Flags::default()
-            }
-            None => flags != Flags::default() || motion.is_some(),
-        };
+        let hindered = flags != Flags::default() || motion.is_some();
         let goal = if !hindered && self.detours[member].is_fresh() {
             open
         } else {
@@ -108,22 +108,8 @@ impl Filter {
     /// from there: each step from its pose would lose what noise puts that back by, and gain nothing where it puts it forward, since
     /// the member goes no faster, and one that turns first would turn after the noise.
     fn sent_by_noisy_poses(&self, seen: &Seen, period: f64, member: usize) -> Option<[f64; 2]> {
-        let is_noisy = self.limits.deviation > 0.0 && !self.crowd.brakes;
-        let is_noisy = is_noisy && self.is_on_its_way(seen, period, member);
+        let is_noisy = self.limits.deviation > 0.0 && self.is_on_its_way(seen, period, member);
         is_noisy.then(|| minus(self.sent.get(member), seen.present.get(member)))
-    }
-
-    /// The end of a member's way in open space, relative to its pose \[m\]; `from` where it was last sent by noisy poses.
-    fn open(
-        &self,
-        request: &MotionRequest,
-        (from, is_moving): (Option<[f64; 2]>, bool),
-        period: f64,
-    ) -> [f64; 2] {
-        let Some(from) = from else { return shortened(request.way, request.reach) };
-        let (on, most) = (minus(request.way, from), (request.reach - length(from)).max(0.0));
-        let step = shortened(on, if is_moving { most } else { self.limits.speed * period });
-        if step == on { request.way } else { plus(from, step) }
     }
 
     fn request(
