@@ -22,7 +22,6 @@ fn what_is_wrong_is_said_once_and_nothing_is_left() {
         (vec!["run", "tension", "--stepps", "3"], "unexpected argument '--stepps'"),
         (vec!["run", "tensio"], "no bundled scene"),
         (vec!["run", "tension", "--set", "rule.mean.kind=x"], "rule.mean"),
-        (vec!["run", "tension", "--set", "update.order=sequential"], "cannot be shared by ranks"),
         (vec!["run", "beam-loaded", "--set", "equilibrium.tolerance=2"], "equilibrium.tolerance"),
         // It is said after all have begun.
         (
