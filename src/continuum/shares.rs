@@ -207,11 +207,12 @@ impl Shares {
         let system = of_plan(scene, plan)?;
         let (solver, _) = choose(&system, request);
         let shares = shared_by(&system, solver, ranks);
-        Ok(shares.map_or(all, |SolverShares { particles, received }| Self {
-            particles,
-            exchanged: Exchanged::Iterations { bytes: PLACE * received },
-            bytes: bytes_each(scene, plan),
-        }))
+        Ok(match shares {
+            None => all,
+            Some(SolverShares { particles, received }) => {
+                Self { particles, exchanged: Exchanged::Iterations { bytes: PLACE * received }, ..all }
+            }
+        })
     }
 
     /// Ranks each of which computes all.

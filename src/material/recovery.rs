@@ -28,8 +28,6 @@ pub const REACH: f64 = 3.5;
 const TRACTION_WEIGHT: f64 = 4.0;
 /// Fewer cells than this say too little.
 pub const FEWEST_CELLS: usize = 6;
-/// Most unknowns of a fit.
-const UNKNOWNS: usize = 4 * DEGREE + 3;
 /// Softness in shear ([`Elastic::softness_in_shear`]) from which on fields need not be compatible: where both kinds are about as far from
 /// finite elements, one spacing from the clamped end of a strip that is pulled \[1\].
 const SOFT: f64 = 15.0;
@@ -65,18 +63,18 @@ pub struct KnownTraction {
 pub struct Fields(Vec<(usize, [f64; HIGHEST + 1])>);
 
 impl Fields {
-    /// Of degrees 2 to 5, in a material soft in shear all of degrees 2 to 4. Compatible strains need `sum_r c_r d^4 f / dx^(4-r) dy^r = 0`: powers of y up to the third are
-    /// free, each further one is what that leaves.
+    /// Of degrees 2 to 5. Compatible strains need `sum_r c_r d^4 f / dx^(4-r) dy^r = 0`: powers of y up to the third are
+    /// free, each further one is what that leaves. In a material soft in shear all of degrees 2 to 4 are free.
     pub fn of(elastic: &Elastic) -> Self {
         let [a, b, c] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|s| elastic.strain(s));
         let operator = [b[1], -2.0 * c[1], 2.0 * b[0] + c[2], -2.0 * c[0], a[0]];
-        let mut fields = Vec::with_capacity(UNKNOWNS);
+        let mut fields = Vec::new();
         let is_soft = elastic.softness_in_shear() > SOFT;
         let (highest, most_free) = if is_soft { (HIGHEST - 1, HIGHEST) } else { (HIGHEST, 3) };
         for (degree, free) in (2..=highest).flat_map(|m| (0..=m.min(most_free)).map(move |free| (m, free))) {
             let mut factors = [0.0; HIGHEST + 1];
             factors[free] = 1.0;
-            for q in 0..if is_soft { 0 } else { (degree + 1).saturating_sub(4) } {
+            for q in (0..(degree + 1).saturating_sub(4)).filter(|_| !is_soft) {
                 let of = |r: usize| operator[r] * falling(degree - q - r, 4 - r) * falling(q + r, r);
                 let left: f64 = (0..4).map(|r| of(r) * factors[q + r]).sum();
                 factors[q + 4] = -left / of(4);
@@ -86,26 +84,26 @@ impl Fields {
         Self(fields)
     }
 
-    /// Stresses (xx, yy, xy) of each at a place; zero beyond the last.
-    fn at(&self, [x, y]: [f64; 2]) -> [[f64; 3]; UNKNOWNS] {
+    /// Stresses (xx, yy, xy) of each at a place.
+    fn at(&self, [x, y]: [f64; 2]) -> impl Iterator<Item = [f64; 3]> {
         let powers = |v: f64| std::array::from_fn::<f64, HIGHEST, _>(|k| v.powi(k as i32));
         let (x, y) = (powers(x), powers(y));
-        let mut columns = [[0.0; 3]; UNKNOWNS];
-        for (column, (degree, factors)) in columns.iter_mut().zip(&self.0) {
+        self.0.iter().map(move |(degree, factors)| {
+            let mut stress = [0.0; 3];
             for p in 0..=*degree {
                 let (factor, q) = (factors[p], degree - p);
                 if p >= 2 {
-                    column[0] += factor * falling(p, 2) * x[q] * y[p - 2];
+                    stress[0] += factor * falling(p, 2) * x[q] * y[p - 2];
                 }
                 if q >= 2 {
-                    column[1] += factor * falling(q, 2) * x[q - 2] * y[p];
+                    stress[1] += factor * falling(q, 2) * x[q - 2] * y[p];
                 }
                 if p >= 1 && q >= 1 {
-                    column[2] -= factor * (p * q) as f64 * x[q - 1] * y[p - 1];
+                    stress[2] -= factor * (p * q) as f64 * x[q - 1] * y[p - 1];
                 }
             }
-        }
-        columns
+            stress
+        })
     }
 }
 
@@ -135,23 +133,22 @@ pub fn stress_at(
         let weight = (cell.area / mean_area).sqrt();
         // The square of a tensor has its shear twice: weighed otherwise, the fit would depend on how the axes are turned.
         let weight = [weight, weight, weight * SQRT_2];
-        for (column, stress) in fields.at(relative(cell.centroid)).into_iter().take(unknowns).enumerate() {
+        for (column, stress) in fields.at(relative(cell.centroid)).enumerate() {
             (0..3).for_each(|c| matrix[(3 * k + c, column)] = weight[c] * stress[c]);
         }
         (0..3).for_each(|c| right[3 * k + c] = weight[c] * cell.stress[c]);
     }
     for (k, known) in tractions.iter().enumerate() {
         let (row, [nx, ny], [dx, dy]) = (3 * cells.len() + k, known.normal, known.direction);
-        for (column, [xx, yy, xy]) in fields.at(relative(known.point)).into_iter().take(unknowns).enumerate()
-        {
+        for (column, [xx, yy, xy]) in fields.at(relative(known.point)).enumerate() {
             matrix[(row, column)] =
                 TRACTION_WEIGHT * (nx * dx * xx + ny * dy * yy + (nx * dy + ny * dx) * xy);
         }
         right[row] = TRACTION_WEIGHT * known.value;
     }
     let fit = matrix.svd(true, true).solve(&right, 1e-10).ok()?;
-    let here = fields.at([0.0; 2]);
-    let stress: [f64; 3] = std::array::from_fn(|c| (0..unknowns).map(|k| fit[k] * here[k][c]).sum());
+    let here: Vec<[f64; 3]> = fields.at([0.0; 2]).collect();
+    let stress: [f64; 3] = std::array::from_fn(|c| fit.iter().zip(&here).map(|(k, of)| k * of[c]).sum());
     stress.iter().all(|s| s.is_finite()).then_some(stress)
 }
 
@@ -180,7 +177,8 @@ mod tests {
         for elastic in [sheet(), fibres(0.0), fibres(0.5), fabric()] {
             let (fields, h, place) = (Fields::of(&elastic), 0.1, [0.3, -0.7]);
             let stress = |n: usize, i: i32, j: i32| {
-                fields.at([place[0] + h * f64::from(i), place[1] + h * f64::from(j)])[n]
+                let at = [place[0] + h * f64::from(i), place[1] + h * f64::from(j)];
+                fields.at(at).nth(n).expect("a field")
             };
             for n in 0..fields.0.len() {
                 // Central differences are exact for quadratics; of cubics the divergence needs the wider ones.

@@ -138,8 +138,8 @@ impl Sweep {
         }
     }
 
-    /// Leaves to the other ranks what is theirs; to be called before anything is swept. A sequential sweep cannot be
-    /// shared: each particle waits for the one before it.
+    /// Leaves to the other ranks what is theirs; to be called before anything is swept. A sequential sweep moves
+    /// all of them all the same: each particle waits for the one before it.
     pub(crate) fn share_with(&mut self, share: Share) {
         if let Some(Held { owned: [start, end], .. }) = share.part {
             self.followers = self.follows[start..end].iter().filter(|&&follows| follows).count();

@@ -31,11 +31,10 @@ pub fn require_wide(outline: &Partition, near: &NearPieces, spacing: f64) -> Res
             let (place, normal) = (piece.point(t), piece.normal(t));
             for across in ways.iter().map(|side| [0, 1].map(|k| place[k] + side * spacing * normal[k])) {
                 for [other_ring, other] in near.around(place, across) {
-                    let is_exempt = sides.are_at_a_corner([ring, number], [other_ring, other]);
-                    let other = outline.piece(other_ring, other);
-                    if is_exempt {
+                    if sides.are_at_a_corner([ring, number], [other_ring, other]) {
                         continue;
                     }
+                    let other = outline.piece(other_ring, other);
                     let opposite = meetings(place, across, other).into_iter().map(|[s, _]| s);
                     let opposite = opposite.filter(|s| *s > 1e-6 && *s < 1.0 - 1e-6);
                     if let Some(share) = opposite.reduce(f64::min) {
