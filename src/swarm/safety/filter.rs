@@ -249,11 +249,13 @@ impl Filter {
         self.meet(seen, wanted, period);
         safe.clone_from(seen.present);
         for (member, flags) in flags.iter_mut().enumerate() {
+            let (from, _) = self.place(seen, period, member);
             let (target, mut changed) = self.target(seen, wanted.get(member), period, member);
             let target = self.within_speed(seen, target, period, member, &mut changed);
             // One that is sent nowhere may be anywhere when it is heard again.
             let sent = if seen.known[member] { target } else { [f64::NAN; 2] };
-            self.sent_before.set(member, self.sent.get(member));
+            let before = if self.limits.deviation > 0.0 { from } else { self.sent.get(member) };
+            self.sent_before.set(member, before);
             self.sent.set(member, sent);
             safe.set(member, target);
             *flags = changed;
@@ -279,8 +281,11 @@ impl Filter {
         // One that has not come so far, or was carried away, is given its way from where it is seen.
         let age = seen.ages[member].max(0.0);
         let is_near = self.is_on_its_way(seen, period, member);
-        let goes_on = is_near && (self.ahead(seen, member) > 0.0 || self.limits.deviation > 0.0);
-        let is_there = is_near || age > (1.0 - TOUCHING) * period || self.limits.deviation > 0.0;
+        if self.limits.deviation > 0.0 {
+            return target;
+        }
+        let goes_on = is_near && self.ahead(seen, member) > 0.0;
+        let is_there = is_near || age > (1.0 - TOUCHING) * period;
         let has_arrived =
             self.limits.arrives && seen.known[member] && is_there && self.is_inexact(seen, period, member);
         let is_elsewhere = goes_on || has_arrived;

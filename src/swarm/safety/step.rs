@@ -54,26 +54,19 @@ impl Filter {
         period: f64,
         member: usize,
     ) -> ([f64; 2], Flags) {
-        let here = seen.present.get(member);
-        let way = minus(wanted, here);
-        if !seen.known[member] || !way.iter().all(|value| value.is_finite()) {
+        let pose = seen.present.get(member);
+        if !seen.known[member] || !minus(wanted, pose).iter().all(|value| value.is_finite()) {
             self.detours[member].reset();
             self.cell.planes.clear();
-            return (here, Flags(Flags::HELD));
+            return (pose, Flags(Flags::HELD));
         }
         let brakes = self.crowd.brakes;
-        let motion = self.motion(seen, period, member);
-        let from = self.sent_by_noisy_poses(seen, period, member).filter(|_| motion.is_none());
-        let mut request = self.request(motion, way, period, self.ahead(seen, member), from);
-        let origins = self.enclose(seen, &mut request, member);
-        let open = match from {
-            None => shortened(way, request.reach),
-            Some(from) => {
-                let on = minus(way, from);
-                let step = shortened(on, self.limits.speed * period);
-                if step == on { way } else { plus(from, step) }
-            }
-        };
+        let (here, ahead) = self.place(seen, period, member);
+        let way = minus(wanted, here);
+        let motion = self.motion(seen, period, here, member);
+        let mut request = self.request(motion, way, period, ahead);
+        let origins = self.enclose(seen, &mut request, here, member);
+        let open = shortened(way, request.reach);
         let mut flags = self.why(open, origins);
         if let Some(Motion { from, .. }) = motion.filter(|_| !brakes) {
             self.leave_room_to_brake(&mut request, from, period, &mut flags);
@@ -82,7 +75,7 @@ impl Filter {
         let goal = if !hindered && self.detours[member].is_fresh() {
             open
         } else {
-            self.around(seen, &request, member, &mut flags)
+            self.around(seen, &request, here, member, &mut flags)
         };
         let step = match motion {
             Some(Motion { velocity, .. }) if brakes => {
@@ -104,29 +97,23 @@ impl Filter {
         (target, flags)
     }
 
-    /// Where a member whose poses are noisy was last sent, relative to its pose \[m\], if it is there or on its way there. It is sent on
-    /// from there: each step from its pose would lose what noise puts that back by, and gain nothing where it puts it forward, since
-    /// the member goes no faster, and one that turns first would turn after the noise.
-    fn sent_by_noisy_poses(&self, seen: &Seen, period: f64, member: usize) -> Option<[f64; 2]> {
-        let is_noisy = self.limits.deviation > 0.0 && self.is_on_its_way(seen, period, member);
-        is_noisy.then(|| minus(self.sent.get(member), seen.present.get(member)))
+    /// The place from which a member is sent on \[m, world frame\], and the time for which it may have gone on from there \[s\]: that of
+    /// its pose, or, where poses are noisy, the one to which it was last sent, if it is there or on its way there. Each step from its
+    /// pose would lose what noise puts that back by, and gain nothing where it puts it forward, since the member goes no faster, and
+    /// one that turns first would turn after the noise.
+    pub(super) fn place(&self, seen: &Seen, period: f64, member: usize) -> ([f64; 2], f64) {
+        let last = self.sent.get(member);
+        let is_noisy = self.limits.deviation > 0.0 && !self.crowd.brakes && last.iter().all(|x| x.is_finite());
+        if is_noisy && (self.limits.arrives || self.is_on_its_way(seen, period, member)) {
+            return (last, 0.0);
+        }
+        (seen.present.get(member), self.ahead(seen, member))
     }
 
-    fn request(
-        &self,
-        motion: Option<Motion>,
-        way: [f64; 2],
-        period: f64,
-        ahead: f64,
-        from: Option<[f64; 2]>,
-    ) -> MotionRequest {
+    fn request(&self, motion: Option<Motion>, way: [f64; 2], period: f64, ahead: f64) -> MotionRequest {
         let (step, distance) = (self.longest_step(period, ahead), length(way));
         match motion {
-            None => {
-                let off = from.map_or(0.0, length);
-                let step = step.max(off + self.limits.speed * period);
-                MotionRequest { way, distance, step, reach: distance.max(off).min(step) }
-            }
+            None => MotionRequest { way, distance, step, reach: distance.min(step) },
             Some(Motion { from, velocity }) => {
                 let (most, ahead) = (self.limits.acceleration, length(from));
                 // One whose limit has been lowered slows down.
@@ -145,16 +132,16 @@ impl Filter {
     /// Where the member is taken to be and how it moves, where a limit asks for it. A late pose is of a place that the
     /// member has left, and two noisy ones give no velocity: it is then taken to go from target to target. Those that
     /// brake have estimates of both.
-    fn motion(&self, seen: &Seen, period: f64, member: usize) -> Option<Motion> {
+    fn motion(&self, seen: &Seen, period: f64, here: [f64; 2], member: usize) -> Option<Motion> {
         let velocity = self.velocity(seen, member)?;
-        let here = seen.present.get(member);
         let [last, before] = [&self.sent, &self.sent_before].map(|sent| sent.get(member));
         let is_known = last.iter().chain(&before).all(|x| x.is_finite());
         if self.brakes(seen) || !is_known || !self.is_inexact(seen, period, member) {
             return Some(Motion { from: [0.0; 2], velocity });
         }
         let velocity = [0, 1].map(|k| (last[k] - before[k]) / period);
-        Some(Motion { from: minus(last, here), velocity: shortened(velocity, self.limits.speed) })
+        let from = if self.limits.deviation > 0.0 { [0.0; 2] } else { minus(last, here) };
+        Some(Motion { from, velocity: shortened(velocity, self.limits.speed) })
     }
 
     /// The place at which a member stands as soon as it can \[m, world frame\]: where its targets are known not behind it, as the place
@@ -174,7 +161,7 @@ impl Filter {
         let before = self.sent_before.get(member);
         let sent = length(minus(last, before)) / period;
         let most = if is_on_its_way && sent.is_finite() { sent.min(self.limits.speed) } else { 0.0 };
-        let way = self.motion(seen, period, member).map_or([0.0; 2], |Motion { velocity, .. }| {
+        let way = self.motion(seen, period, here, member).map_or([0.0; 2], |Motion { velocity, .. }| {
             let velocity = shortened(velocity, most);
             velocity.map(|v| v * length(velocity) / (2.0 * self.limits.acceleration))
         });
@@ -188,14 +175,30 @@ impl Filter {
     }
 
     /// Builds the member's cell; with more reach where it stands too near to something, since it then moves away.
-    fn enclose(&mut self, seen: &Seen, request: &mut MotionRequest, member: usize) -> Origins {
-        let origins = self.build_cell(seen, request.reach, member);
+    fn enclose(
+        &mut self,
+        seen: &Seen,
+        request: &mut MotionRequest,
+        here: [f64; 2],
+        member: usize,
+    ) -> Origins {
+        let origins = self.cell_around(seen, request.reach, here, member);
         let away = self.radii[member] + self.largest_radius + self.limits.clearance;
         if request.reach >= away || !self.cell.planes.iter().any(|plane| plane.offset < -TOUCHING * away) {
             return origins;
         }
         request.reach = away.min(request.step).max(request.reach);
-        self.build_cell(seen, request.reach, member)
+        self.cell_around(seen, request.reach, here, member)
+    }
+
+    /// Builds the member's cell, which is that of its pose, relative to a place \[m, world frame\].
+    fn cell_around(&mut self, seen: &Seen, reach: f64, here: [f64; 2], member: usize) -> Origins {
+        let from = minus(here, seen.present.get(member));
+        let origins = self.build_cell(seen, reach + length(from), member);
+        for plane in &mut self.cell.planes {
+            plane.offset -= dot(plane.normal, from);
+        }
+        origins
     }
 
     fn build_cell(&mut self, seen: &Seen, reach: f64, member: usize) -> Origins {
@@ -300,9 +303,16 @@ impl Filter {
     }
 
     /// The point of the cell to go to: the nearest to the wanted one or, of a detour, to its aim.
-    fn around(&mut self, seen: &Seen, request: &MotionRequest, member: usize, flags: &mut Flags) -> [f64; 2] {
+    fn around(
+        &mut self,
+        seen: &Seen,
+        request: &MotionRequest,
+        here: [f64; 2],
+        member: usize,
+        flags: &mut Flags,
+    ) -> [f64; 2] {
         let MotionRequest { way, distance, step, reach } = *request;
-        let place = plus(seen.present.get(member), way);
+        let place = plus(here, way);
         let direct = self.cell.nearest(way, reach);
         let size = self.radii[member] + self.limits.clearance;
         // Nearer to its goal than its own size, a member waits for the one that stands there; as near as solids and lost members
