@@ -20,15 +20,6 @@ struct MotionRequest {
     reach: f64,
 }
 
-/// A member's motion as far as it is known.
-#[derive(Clone, Copy)]
-struct Motion {
-    /// Its place, relative to that of its pose \[m\].
-    from: [f64; 2],
-    /// \[m/s\]
-    velocity: [f64; 2],
-}
-
 /// The origins of a cell's planes, by their index: first members, then obstacles, then the fence.
 #[derive(Clone, Copy)]
 struct Origins {
@@ -61,29 +52,29 @@ impl Filter {
             return (pose, Flags(Flags::HELD));
         }
         let brakes = self.crowd.brakes;
-        let (here, ahead) = self.place(seen, period, member);
+        let (here, most) = self.place(seen, period, member);
         let way = minus(wanted, here);
-        let motion = self.motion(seen, period, here, member);
-        let mut request = self.request(motion, way, period, ahead);
+        let velocity = self.motion(seen, period, member);
+        let mut request = self.request(velocity, way, period, most);
         let origins = self.enclose(seen, &mut request, here, member);
         let open = shortened(way, request.reach);
         let mut flags = self.why(open, origins);
-        if let Some(Motion { from, .. }) = motion.filter(|_| !brakes) {
-            self.leave_room_to_brake(&mut request, from, period, &mut flags);
+        if velocity.is_some() && !brakes {
+            self.leave_room_to_brake(&mut request, period, &mut flags);
         }
-        let hindered = flags != Flags::default() || motion.is_some();
+        let hindered = flags != Flags::default() || velocity.is_some();
         let goal = if !hindered && self.detours[member].is_fresh() {
             open
         } else {
             self.around(seen, &request, here, member, &mut flags)
         };
-        let step = match motion {
-            Some(Motion { velocity, .. }) if brakes => {
+        let step = match velocity {
+            Some(velocity) if brakes => {
                 let promised = self.promised(seen, member);
                 self.brakable(velocity, promised, goal, period, &mut flags)
             }
-            Some(motion) => {
-                shortened(self.steered(motion, goal, period, (&request, origins), &mut flags), request.step)
+            Some(velocity) => {
+                shortened(self.steered(velocity, goal, period, (&request, origins), &mut flags), request.step)
             }
             None => shortened(goal, request.step),
         };
@@ -97,51 +88,60 @@ impl Filter {
         (target, flags)
     }
 
-    /// The place from which a member is sent on \[m, world frame\], and the time for which it may have gone on from there \[s\]: that of
-    /// its pose, or, where poses are noisy, the one to which it was last sent, if it is there or on its way there. Each step from its
-    /// pose would lose what noise puts that back by, and gain nothing where it puts it forward, since the member goes no faster, and
-    /// one that turns first would turn after the noise.
+    /// The place from which a member is sent on \[m, world frame\], and how far it may be sent from there \[m\]: that of its pose, or,
+    /// where poses are late or noisy, the one to which it was last sent, if it is there or on its way there. The step from where it is
+    /// seen is not the step it makes: each would lose what noise puts the pose back by, and gain nothing where it puts it forward,
+    /// since the member goes no faster, and one that turns first would turn after the noise. One that lags is waited for.
     pub(super) fn place(&self, seen: &Seen, period: f64, member: usize) -> ([f64; 2], f64) {
-        let last = self.sent.get(member);
-        let is_noisy = self.limits.deviation > 0.0 && !self.crowd.brakes && last.iter().all(|x| x.is_finite());
-        if is_noisy && (self.limits.arrives || self.is_on_its_way(seen, period, member)) {
-            return (last, 0.0);
+        let (pose, last) = (seen.present.get(member), self.sent.get(member));
+        let (ahead, margin, most) =
+            (self.ahead(seen, member), self.limits.margin(), self.limits.speed * period);
+        let from_pose = (pose, self.longest_step(period, ahead));
+        if self.crowd.brakes || !last.iter().all(|x| x.is_finite()) {
+            return from_pose;
         }
-        (seen.present.get(member), self.ahead(seen, member))
+        let is_near = self.is_on_its_way(seen, period, member);
+        if self.limits.arrives && seen.known[member] && self.is_inexact(seen, period, member) {
+            let is_there = is_near || seen.ages[member] > (1.0 - TOUCHING) * period || margin > 0.0;
+            return if is_there { (last, most) } else { from_pose };
+        }
+        if !is_near || (ahead == 0.0 && margin == 0.0) {
+            return from_pose;
+        }
+        let room = self.longest_step(period, ahead) + margin - distance(last, pose);
+        (last, room.clamp(0.0, most))
     }
 
-    fn request(&self, motion: Option<Motion>, way: [f64; 2], period: f64, ahead: f64) -> MotionRequest {
-        let (step, distance) = (self.longest_step(period, ahead), length(way));
-        match motion {
+    fn request(&self, velocity: Option<[f64; 2]>, way: [f64; 2], period: f64, step: f64) -> MotionRequest {
+        let distance = length(way);
+        match velocity {
             None => MotionRequest { way, distance, step, reach: distance.min(step) },
-            Some(Motion { from, velocity }) => {
-                let (most, ahead) = (self.limits.acceleration, length(from));
+            Some(velocity) => {
+                let most = self.limits.acceleration;
                 // One whose limit has been lowered slows down.
                 let top = (length(velocity) + most * period).min(self.limits.speed.max(length(velocity)));
                 let reach = if self.crowd.brakes {
                     // To the end of the longest step, and of the braking after it.
                     0.5 * period * length(velocity) + self.braking().covered([top, 0.0], period)[0]
                 } else {
-                    ahead + top * period + top * top / (2.0 * most)
+                    top * period + top * top / (2.0 * most)
                 };
-                MotionRequest { way, distance, step: step.min(ahead + top * period), reach }
+                MotionRequest { way, distance, step: step.min(top * period), reach }
             }
         }
     }
 
-    /// Where the member is taken to be and how it moves, where a limit asks for it. A late pose is of a place that the
+    /// The velocity at which the member is taken to go \[m/s\], where a limit asks for it. Late poses are of places that the
     /// member has left, and two noisy ones give no velocity: it is then taken to go from target to target. Those that
-    /// brake have estimates of both.
-    fn motion(&self, seen: &Seen, period: f64, here: [f64; 2], member: usize) -> Option<Motion> {
+    /// brake have estimates.
+    fn motion(&self, seen: &Seen, period: f64, member: usize) -> Option<[f64; 2]> {
         let velocity = self.velocity(seen, member)?;
         let [last, before] = [&self.sent, &self.sent_before].map(|sent| sent.get(member));
         let is_known = last.iter().chain(&before).all(|x| x.is_finite());
         if self.brakes(seen) || !is_known || !self.is_inexact(seen, period, member) {
-            return Some(Motion { from: [0.0; 2], velocity });
+            return Some(velocity);
         }
-        let velocity = [0, 1].map(|k| (last[k] - before[k]) / period);
-        let from = if self.limits.deviation > 0.0 { [0.0; 2] } else { minus(last, here) };
-        Some(Motion { from, velocity: shortened(velocity, self.limits.speed) })
+        Some(shortened([0, 1].map(|k| (last[k] - before[k]) / period), self.limits.speed))
     }
 
     /// The place at which a member stands as soon as it can \[m, world frame\]: where its targets are known not behind it, as the place
@@ -161,7 +161,7 @@ impl Filter {
         let before = self.sent_before.get(member);
         let sent = length(minus(last, before)) / period;
         let most = if is_on_its_way && sent.is_finite() { sent.min(self.limits.speed) } else { 0.0 };
-        let way = self.motion(seen, period, here, member).map_or([0.0; 2], |Motion { velocity, .. }| {
+        let way = self.motion(seen, period, member).map_or([0.0; 2], |velocity| {
             let velocity = shortened(velocity, most);
             velocity.map(|v| v * length(velocity) / (2.0 * self.limits.acceleration))
         });
@@ -377,13 +377,7 @@ impl Filter {
     /// Brings the cell's borders and the end of the way as near as the member can go in a period and brake
     /// in time after it, `v T + v^2 / (2 a)` being the room from where it is: a member that kept to this at the last tick
     /// can do so at this one, as long as the borders stay.
-    fn leave_room_to_brake(
-        &mut self,
-        request: &mut MotionRequest,
-        from: [f64; 2],
-        period: f64,
-        flags: &mut Flags,
-    ) {
+    fn leave_room_to_brake(&mut self, request: &mut MotionRequest, period: f64, flags: &mut Flags) {
         let most = self.limits.acceleration;
         // The difference of two times would lose all its digits where the limit is large.
         let step = |room: f64| {
@@ -391,13 +385,10 @@ impl Filter {
             (2.0 * room * period / (time + period)).min(room)
         };
         let end = self.cell.nearest(request.way, request.reach);
-        let brakable = length(from) + step(length(minus(end, from)));
+        let brakable = step(length(end));
+        // At the border or beyond it as it is, there is nothing to bring nearer.
         for plane in self.cell.planes.iter_mut().filter(|plane| plane.offset > 0.0) {
-            let gone = dot(plane.normal, from);
-            // At the border or beyond it as it is, there is nothing to bring nearer.
-            if plane.offset > gone {
-                plane.offset = (gone + step(plane.offset - gone)).max(0.0);
-            }
+            plane.offset = step(plane.offset);
         }
         if brakable < request.step.min(request.distance) {
             flags.0 |= Flags::ACCELERATION_LIMITED;
@@ -409,19 +400,19 @@ impl Filter {
     /// comes first where it leaves none.
     fn steered(
         &self,
-        Motion { from, velocity }: Motion,
+        velocity: [f64; 2],
         goal: [f64; 2],
         period: f64,
         (request, origins): (&MotionRequest, Origins),
         flags: &mut Flags,
     ) -> [f64; 2] {
-        let change = [0, 1].map(|k| (goal[k] - from[k]) / period - velocity[k]);
+        let change = [0, 1].map(|k| goal[k] / period - velocity[k]);
         let held = shortened(change, self.limits.acceleration * period);
         if held == change {
             return goal;
         }
         flags.0 |= Flags::ACCELERATION_LIMITED;
-        let next = [0, 1].map(|k| from[k] + (velocity[k] + held[k]) * period);
+        let next = [0, 1].map(|k| (velocity[k] + held[k]) * period);
         flags.0 |= self.why(next, origins).0;
         self.cell.nearest(next, request.step)
     }
