@@ -31,7 +31,7 @@ use crate::flock::body::Body;
 use crate::flock::law::{Flock, MatrixWeights, Weights};
 use crate::flock::rules::{Corner, Mean, OWN, Rotation, Turn, patch_row};
 use crate::flock::vectors::Vectors;
-use crate::geometry::point::minus;
+use crate::geometry::point::{distance, minus};
 use crate::ranks::{Team, added};
 
 /// Parts of a way at whose ends the force that moves the body is looked at: odd, so that leaders that turn there and back, or
@@ -41,6 +41,10 @@ const LOOKS: u32 = 7;
 const MOST_STEPS: usize = 16;
 /// Steps in a row that do not halve the residual after which rounding is taken to have the last word.
 const STALLED: usize = 2;
+/// Parts into which a way is cut at most because leaders turn on it.
+const MOST_PARTS: u32 = 1024;
+/// Leaders go straight on enough where twice as many parts of their way are together no longer than this many times \[1\].
+const STRAIGHT: f64 = 1.1;
 /// Linear systems of a whole way.
 const MOST_SOLVES: usize = 500;
 /// Least part of the way taken at once.
@@ -349,6 +353,32 @@ impl Corotated<'_> {
         on_the_way.chain([1.0]).map(|part| self.size_at(part)).fold(0.0, f64::max)
     }
 
+    /// The largest part of the way on which leaders go straight on, or nearly so: one that turns once round is where it began, and
+    /// the body is not.
+    fn straight_part(&self) -> f64 {
+        let path = |parts: u32| {
+            let place = |k: u32| (self.way.held)(self.way.part(f64::from(k) / f64::from(parts)));
+            let (mut sum, mut last) = (0.0, place(0));
+            for k in 1..=parts {
+                let next = place(k);
+                let moved = |i: usize| distance(next.get(i), last.get(i));
+                sum += self.largest(self.body.owned().map(moved).fold(0.0, f64::max));
+                last = next;
+            }
+            sum
+        };
+        let (mut parts, mut finer) = (1, LOOKS);
+        let mut known = path(1);
+        while parts < MOST_PARTS {
+            let found = path(finer);
+            if found <= STRAIGHT * known {
+                break;
+            }
+            (parts, finer, known) = (finer, 2 * finer, found);
+        }
+        1.0 / f64::from(parts)
+    }
+
     /// The force with leaders as they are after a part of the whole way, all followers at zero and all cells in the axes of the
     /// reference.
     fn size_at(&self, part: f64) -> f64 {
@@ -374,7 +404,7 @@ impl Corotated<'_> {
     fn norm(&self, points: &Vectors) -> f64 {
         let size = |i: usize| points.get(i).into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let largest = self.body.owned().map(size).fold(0.0, f64::max);
-        let largest = self.part.as_ref().map_or(largest, |part| part.team.largest([largest])[0]);
+        let largest = self.largest(largest);
         // In a unit of their size squares neither vanish nor overflow: a power of two, which keeps all bits.
         let unit = if largest.is_normal() { largest.log2().floor().exp2() } else { 1.0 };
         let square = |i: usize| {
@@ -387,6 +417,11 @@ impl Corotated<'_> {
             Some(part) => part.team.sum_in_order([0.0], own, self.body.has_some_after_all()),
         };
         unit * sum.sqrt()
+    }
+
+    /// The largest of all ranks.
+    fn largest(&self, own: f64) -> f64 {
+        self.part.as_ref().map_or(own, |part| part.team.largest([own])[0])
     }
 
     /// Whether it is so on any rank.
@@ -454,9 +489,10 @@ impl Newton<'_> {
         let way = self.rule.way;
         let mut u =
             way.start.map_or_else(|| Vectors::zeros(self.rule.follows.len()), |(start, _)| start.clone());
-        let (mut done, mut stride) = (0.0, 1.0);
+        let longest = self.rule.straight_part();
+        let (mut done, mut stride) = (0.0, longest);
         while done < 1.0 {
-            let part = f64::min(done + stride, 1.0);
+            let part = f64::min(done + stride.min(longest), 1.0);
             let goal = if part == 1.0 { tolerance } else { tolerance.max(ON_THE_WAY) };
             match self.increment(&u, way.part(part), goal) {
                 Ok(Some(next)) => (u, done, stride) = (next, part, 2.0 * stride),

@@ -74,7 +74,7 @@ fn a_bar_turned_once_around_at_both_ends_is_never_strained() {
         };
         bar.body.reference.iter().enumerate().map(by).collect()
     };
-    for count in [8, 12] {
+    for count in [1, 8, 12] {
         for (k, solved) in in_increments(&bar, &held, count).iter().enumerate() {
             let (at, part) = (bar.moved(&solved.displacement), (k + 1) as f64 / f64::from(count));
             let apart = bar.body.reference.iter().zip(at.iter()).map(|(p, q)| distance(turned(part, p), q));
@@ -82,4 +82,36 @@ fn a_bar_turned_once_around_at_both_ends_is_never_strained() {
             assert!(energy(&bar, &at) < 1e-12, "{k} of {count}");
         }
     }
+}
+
+/// A whole turn of one end leaves it where it began, and the body is not.
+#[test]
+fn a_bar_turned_once_around_at_one_end_is_not_at_rest_where_it_began() {
+    let mut bar = unloaded();
+    on_the_right(&bar).into_iter().for_each(|i| bar.follows[i] = false);
+    let middle = [0.5 * LENGTH, 0.0];
+    let turned_by = |turns: f64, [x, y]: [f64; 2]| {
+        let (sin, cos) = (turns * std::f64::consts::TAU).sin_cos();
+        let [x, y] = [x - middle[0], y - middle[1]];
+        [middle[0] + cos * x - sin * y, middle[1] + sin * x + cos * y]
+    };
+    let solved = |turns: f64| {
+        let held = |part: f64| -> Vectors {
+            let by = |p: [f64; 2]| {
+                let [x, y] = turned_by(part * turns, p);
+                if (p[0] - LENGTH).abs() < 1e-9 { [x - p[0], y - p[1]] } else { [0.0; 2] }
+            };
+            bar.body.reference.iter().map(by).collect()
+        };
+        let (follows, axes) = (bar.follows.clone(), bar.held_axes.clone());
+        corotated::solve(&bar.flock, &bar.body, follows, axes, &Way::whole(&held), &Request::default())
+    };
+    for turns in [1.0, -2.0, 11.0, 350.0 / 360.0] {
+        let reached = match solved(turns) {
+            Err(corotated::CorotatedError::Unsettled { part, .. }) => turns.abs() * part,
+            other => panic!("{turns} turns: {other:?}"),
+        };
+        assert!(reached > 0.3 && reached < 0.6, "{turns} turns: {reached} of one");
+    }
+    assert!(solved(-10.0 / 360.0).is_ok());
 }
