@@ -108,7 +108,7 @@ impl Filter {
         if !is_near || (ahead == 0.0 && margin == 0.0) {
             return from_pose;
         }
-        let room = self.longest_step(period, ahead) + margin - distance(last, pose);
+        let room = self.longest_step(period, ahead) + 2.0 * margin - distance(last, pose);
         (last, room.clamp(0.0, most))
     }
 
