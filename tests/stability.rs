@@ -1,6 +1,7 @@
 //! Thresholds predicted and measured, and extremes that end right or refused.
 
 use flockform::engine::Engine;
+use flockform::flock::role::Role;
 use flockform::flock::vectors::Vectors;
 use flockform::scene::bundled;
 use flockform::solve::spectrum::scatter;
@@ -155,6 +156,43 @@ fn a_body_that_nobody_holds_is_refused_by_name() {
     let all = "roles=[{region={kind=\"all\"},role=\"clamped\"}]";
     let refused = Subject::of(&load("tension", &[all, "frame=none", NO_PROBES])).expect_err("none follow");
     assert!(refused.to_string().contains("no followers"), "{refused}");
+}
+
+/// Damping does not save a body whose frame, which lags, makes it grow whatever it is damped by.
+#[test]
+fn a_body_that_grows_at_every_damping_is_said_to() {
+    let linear = linear("feedback-grow", &[]);
+    let of = |side| linear.thresholds.iter().find(|t| (t.parameter, t.side) == (Parameter::Damping, side));
+    let upper = of(Side::Upper).expect("asked for");
+    assert!(upper.grows_everywhere && upper.predicted.is_none() && upper.found.is_none(), "{upper:?}");
+    let study = study("feedback-grow", &[], true).to_string();
+    assert!(study.contains("everywhere     everywhere") && !study.contains("nowhere"), "{study}");
+}
+
+/// A component that is held takes no particle out of the sweep. Truth is the decay of the scene's own run, which the study has no part in.
+#[test]
+fn followers_of_which_one_component_is_held_are_in_the_spectrum() {
+    let scene = load("bar", &["lattice.spacing=5.0", "loads=[]"]);
+    let plan = planned(&scene);
+    let mut engine = Engine::new(plan.setup);
+    let disturbed = engine
+        .present()
+        .iter()
+        .enumerate()
+        .map(|(i, [x, y])| [x + scatter(2 * i as u64), y + scatter(2 * i as u64 + 1)]);
+    let disturbed = disturbed.collect();
+    engine.place_at_rest(0, &disturbed);
+    let size =
+        |engine: &Engine| engine.displacements().iter().map(|[x, y]| x * x + y * y).sum::<f64>().sqrt();
+    (0..1000).for_each(|_| engine.advance());
+    let before = size(&engine);
+    engine.advance();
+    let decay = size(&engine) / before;
+    let subject = Subject::of(&scene).expect("linear");
+    let radius = subject.sweep().radius().radius;
+    let followers = engine.roles().iter().filter(|role| **role == Role::Follower).count();
+    assert_eq!(subject.followers(), followers);
+    assert!((radius - decay).abs() < 1e-7, "{radius}, {decay} in a run");
 }
 
 fn assert_none_wrong(cases: &[Case]) {

@@ -230,10 +230,12 @@ pub fn held(engine: &Engine) -> Vec<Vec<Held>> {
     order.sort_by_key(|&k| changes[k].from);
     let mut holder = vec![[None; 2]; roles.len()];
     for k in order {
-        let RoleChange { particles, role, axis, .. } = &changes[k];
+        let RoleChange { particles, role, axis, when, .. } = &changes[k];
         // A particle of which one component is held follows along the other.
         let present = if axis.is_some() { Role::Follower } else { *role };
-        for &i in particles.iter().filter(|&&i| roles[i] == present) {
+        // By a condition only those that met it.
+        let is_taken = |i: usize| when.is_none() || engine.taken_by[i] as usize == k + 1;
+        for &i in particles.iter().filter(|&&i| roles[i] == present && is_taken(i)) {
             match axis {
                 Some(axis) => holder[i][*axis as usize] = Some(k),
                 None if role.is_led() => holder[i] = [Some(k); 2],

@@ -241,6 +241,18 @@ fn a_bar_in_uniaxial_tension_has_the_stress_of_its_load_everywhere() {
     }
 }
 
+/// The clamp that only particles beyond a metre would take holds those of the left edge no more than without it.
+#[test]
+fn an_entry_whose_condition_never_held_has_no_reaction() {
+    let never = "[[roles]]\nregion = { kind = \"all\" }\nrole = \"clamped\"\nwhen = { quantity = \"displacement\", above = 1.0 }\n";
+    let (folder, _) = run(&[BAR, never, PULL, "[stop]\nsteps = 20\n"], &["--figures", "none"], 0);
+    let (without, _) = run(&[BAR, PULL, "[stop]\nsteps = 20\n"], &["--figures", "none"], 0);
+    let [found, expected] =
+        [&folder, &without].map(|folder| summary(folder.path())["mechanics"]["reactions"].clone());
+    assert!(number(&expected[0]["force"][0]) < 0.0 && expected[1].is_null(), "{expected}");
+    assert_eq!(found, expected);
+}
+
 #[test]
 fn a_led_region_returns_its_force_and_the_supports_do_the_work() {
     let (folder, _) = run(&[BAR, LEAD, SOLVED], &["--figures", "none"], 0);

@@ -51,8 +51,9 @@ fn tables(study: &Study) -> Vec<Table> {
     if let Some(linear) = &study.linear {
         let exact = |value: f64| format!("{value:.9}");
         let rows = linear.thresholds.iter().map(|threshold| {
-            let predicted = threshold.predicted.as_ref().map_or("none".into(), |p| exact(p.value));
-            let found = threshold.found.as_ref().map_or("none".into(), |f| exact(f.value));
+            let predicted =
+                threshold.predicted.as_ref().map_or(threshold.without_value().into(), |p| exact(p.value));
+            let found = threshold.found.as_ref().map_or(threshold.without_value().into(), |f| exact(f.value));
             vec![threshold.name(), predicted, found, number(threshold.tolerance), threshold.verdict()]
         });
         let head = ["parameter", "predicted by the spectrum", "found by runs", "may differ by", ""];

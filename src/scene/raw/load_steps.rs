@@ -10,10 +10,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RawLoadSteps {
-    /// So many equal parts of the loads and of the leaders' motions, each solved to equilibrium.
+    /// So many equal parts of the loads and of the leaders' way, each solved to equilibrium. Leaders are where their motions have
+    /// them after that part of the steps until the last of them arrives, or of `stop.steps` where one never does.
     #[schemars(range(min = 1, max = 1000000))]
     pub increments: Option<usize>,
-    /// Parts of the loads and of the leaders' motions, from 0 to 1, in the order in which they are solved to
+    /// Parts of the loads and of the leaders' way, from 0 to 1, in the order in which they are solved to
     /// equilibrium: one lower than that before it unloads [1].
     #[schemars(length(min = 1))]
     pub schedule: Option<Vec<f64>>,

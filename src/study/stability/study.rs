@@ -22,6 +22,8 @@ pub struct Threshold {
     pub predicted: Option<Predicted>,
     /// From runs.
     pub found: Option<Found>,
+    /// Whether the body grows where the search begins, where growth is least to be expected: then there is no threshold.
+    pub grows_everywhere: bool,
     /// How far apart the two may be: a thousandth of what the sweep is from growing, or from not growing,
     /// at the parameter's neutral value (no feedback, no damping), and 1e-6 at least; where runs do not settle
     /// 4 over the number of their steps, which is what they can resolve; of values above 1, so much of them \[1\].
@@ -37,6 +39,11 @@ impl Threshold {
     /// The parameter, and on which side.
     pub fn name(&self) -> String {
         format!("{} ({})", self.parameter.name(), self.side.name())
+    }
+
+    /// What stands for a value where there is none.
+    pub fn without_value(&self) -> &'static str {
+        if self.grows_everywhere { "everywhere" } else { "nowhere" }
     }
 
     /// What there is to say of how runs and spectrum agree; empty where they do.
@@ -189,7 +196,9 @@ fn threshold(
     let predicted =
         predict(subject, parameter, side, &mut |value| progress(&format!("{what}: the spectrum at {value}")));
     let size = predicted.as_ref().map_or(1.0, |predicted| predicted.value.abs().max(1.0));
-    Threshold { parameter, side, predicted, found, tolerance: tolerance * size }
+    let grows_everywhere =
+        predicted.is_none() && subject.with(parameter, from.0).sweep().radius_from_one().radius > 1.0;
+    Threshold { parameter, side, predicted, found, grows_everywhere, tolerance: tolerance * size }
 }
 
 /// Runs and spectra from one threshold to the other and a little beyond.
@@ -299,7 +308,8 @@ impl fmt::Display for Linear {
                 threshold.predicted.as_ref().map(|p| p.value),
                 threshold.found.as_ref().map(|found| found.value),
             ];
-            let shown = |value: Option<f64>| value.map_or("nowhere".into(), |v| format!("{v:.8}"));
+            let shown =
+                |value: Option<f64>| value.map_or(threshold.without_value().into(), |v| format!("{v:.8}"));
             let apart = predicted.zip(found).map_or(String::new(), |(p, f)| format!("{:.1e}", (p - f).abs()));
             let (name, verdict) = (threshold.name(), threshold.verdict());
             let row =

@@ -6,6 +6,7 @@ use crate::continuum::layout::Layout;
 use crate::continuum::plan::Plan;
 use crate::engine::Engine;
 use crate::engine::setup::Setup;
+use crate::flock::law::Weights;
 use crate::flock::role::Role;
 use crate::flock::rules::{Feedback, FeedbackReference};
 use crate::flock::vectors::Vectors;
@@ -58,7 +59,8 @@ impl Subject {
         require_linear(scene, &plan)?;
         let mut changes = std::mem::take(&mut plan.setup.changes);
         changes.sort_by_key(|change| change.from);
-        for change in changes.iter().filter(|change| change.when.is_none()) {
+        // Single components are held by the rule's weights, and their particles follow.
+        for change in changes.iter().filter(|change| change.when.is_none() && change.axis.is_none()) {
             change.particles.iter().for_each(|&i| plan.setup.roles[i] = change.role);
         }
         for role in plan.setup.roles.iter_mut().filter(|role| **role == Role::Leader) {
@@ -141,8 +143,12 @@ impl Subject {
         let Setup { body, flock, roles, .. } = &self.plan.setup;
         let labels = body.components(&flock.neighbours);
         let mut held = vec![false; labels.len()];
-        for (&label, _) in labels.iter().zip(roles).filter(|(_, role)| **role == Role::Clamped) {
-            held[label as usize] = true;
+        let by_weights = |i: usize| match &flock.weights {
+            Weights::Matrix(weights) => weights.held(i).contains(&true),
+            _ => false,
+        };
+        for i in (0..labels.len()).filter(|&i| roles[i] == Role::Clamped || by_weights(i)) {
+            held[labels[i] as usize] = true;
         }
         let follower = |&i: &usize| roles[i] == Role::Follower;
         let help = "clamp or lead some of every part, and leave some to follow";

@@ -56,7 +56,7 @@ pub fn start(subject: &Subject, parameter: Parameter, side: Side) -> (f64, f64) 
     }
 }
 
-/// The value at which the spectral radius passes 1, from the stable range outwards; `None` where it passes nowhere.
+/// The value at which the spectral radius passes 1, from the stable range outwards; `None` where it passes nowhere, or there is no such range.
 /// `progress` is called with each value before its radius is computed.
 pub fn predict(
     subject: &Subject,
