@@ -6,6 +6,8 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
+use serde::{Deserialize, Serialize};
+
 use crate::flock::block::{Block, apply};
 use crate::flock::body::Body;
 use crate::flock::law::MatrixWeights;
@@ -45,10 +47,7 @@ pub fn along_outline(
     let own = here.into_iter().filter(|i| owned.contains(i)).map(row);
     let rows: BTreeMap<usize, Row> = match team {
         None => own.collect(),
-        Some(team) => {
-            let words: Vec<u64> = own.flat_map(|(index, row)| row.words(index)).collect();
-            Row::of_words(&team.gather_all(&words))
-        }
+        Some(team) => team.gather_all(&own.collect::<Vec<_>>()).into_iter().collect(),
     };
     let along = rows.iter().filter(|(_, row)| row.is_along).map(|(&index, _)| index);
     let members = rings(along, |index| Some(rows.get(&index)?.blocks.iter().map(|(other, _)| *other)));
@@ -83,34 +82,10 @@ pub fn along_outline(
 }
 
 /// The weights of the neighbours of a particle, which are named by their indices in the whole body.
+#[derive(Serialize, Deserialize)]
 struct Row {
     is_along: bool,
     blocks: Vec<(usize, Block)>,
-}
-
-impl Row {
-    fn words(self, index: usize) -> Vec<u64> {
-        let block = |(other, block): (usize, Block)| {
-            [other as u64].into_iter().chain(block.into_iter().flatten().map(f64::to_bits))
-        };
-        let head = [index as u64, u64::from(self.is_along), self.blocks.len() as u64];
-        head.into_iter().chain(self.blocks.into_iter().flat_map(block)).collect()
-    }
-
-    fn of_words(mut words: &[u64]) -> BTreeMap<usize, Self> {
-        let mut rows = BTreeMap::new();
-        while let [index, is_along, count, rest @ ..] = words {
-            let (blocks, after) = rest.split_at(5 * *count as usize);
-            let block = |of: &[u64]| {
-                let [a, b, c, d] = std::array::from_fn(|k| f64::from_bits(of[k + 1]));
-                (of[0] as usize, [[a, b], [c, d]])
-            };
-            let blocks = blocks.chunks_exact(5).map(block).collect();
-            rows.insert(*index as usize, Self { is_along: *is_along == 1, blocks });
-            words = after;
-        }
-        rows
-    }
 }
 
 /// Particles, then those that they see, then those that these see, in the order in which they are found.

@@ -151,17 +151,16 @@ fn bonds_until(setup: &Setup, team: Option<&Team>) -> Vec<u64> {
     let own: u64 = body.owned().filter(|i| !is_later(i)).map(bonds).sum();
     let counts = team.map_or_else(|| Vec::from([[own]]), |team| team.each([own]));
     let mut sum: u64 = counts.iter().take(team.map_or(0, Team::rank)).map(|[bonds]| bonds).sum();
-    let later: Vec<u64> =
-        body.owned().filter(is_later).flat_map(|i| [body.index(i) as u64, bonds(i)]).collect();
+    let later: Vec<_> = body.owned().filter(is_later).map(|i| (body.index(i), bonds(i))).collect();
     let later = team.map_or_else(Vec::new, |team| team.gather_all(&later));
-    let mut later: BTreeMap<u64, u64> = later.chunks_exact(2).map(|of| (of[0], of[1])).collect();
+    let mut later: BTreeMap<usize, u64> = later.into_iter().collect();
     let mut all: u64 = counts.iter().map(|[bonds]| bonds).sum();
     for until in later.values_mut() {
         all += *until;
         *until = all;
     }
     let until = |i: usize| match body.index_after_all(i) {
-        Some(index) => later[&(index as u64)],
+        Some(index) => later[&index],
         None => {
             sum += bonds(i);
             sum

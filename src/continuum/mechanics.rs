@@ -177,20 +177,8 @@ impl Stresses {
 /// The highest of the peaks of all parts, if there is one: of several the first cell, or particle.
 fn highest_of_parts(engine: &Engine, own: Option<Peak>) -> Option<Peak> {
     let Some(team) = engine.parted() else { return own };
-    let ids: Vec<u64> = own.iter().flat_map(|peak| &peak.particles).map(|&id| id as u64).collect();
-    let words = own.map_or([0; 5], |peak| {
-        let [x, y] = peak.place.map(f64::to_bits);
-        [ids.len() as u64, peak.von_mises.to_bits(), peak.cell.map_or(0, |cell| cell as u64), x, y]
-    });
-    let mut ids = team.gather_all(&ids).into_iter().map(|id| id as usize);
-    let all = team.each(words).into_iter().map(|[count, von_mises, cell, x, y]| Peak {
-        von_mises: f64::from_bits(von_mises),
-        cell: (cell > 0).then_some(cell as usize),
-        place: [x, y].map(f64::from_bits),
-        particles: ids.by_ref().take(count as usize).collect(),
-    });
     let is_first = |a: &Peak, b: &Peak| (a.cell, &a.particles) < (b.cell, &b.particles);
-    all.filter(|peak| !peak.particles.is_empty()).reduce(|best, next| {
+    team.gather_all(own.as_slice()).into_iter().reduce(|best, next| {
         let is_higher =
             next.von_mises > best.von_mises || (next.von_mises == best.von_mises && is_first(&next, &best));
         if is_higher { next } else { best }

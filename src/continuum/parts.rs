@@ -13,6 +13,7 @@ use super::among::followed;
 use super::layout::refusals::{refuse_body, refuse_fit};
 use super::layout::regions::FLAT;
 use super::layout::{Layout, outlay_of, to_be_fitted};
+use crate::engine::shared::agreed_caches;
 use crate::flock::body::{Body, Cut};
 use crate::flock::lattice::Lattice;
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
@@ -124,13 +125,10 @@ impl Parting {
         let counted = agreed(scene, team, Counted::of(scene, fitted.as_ref(), own))?;
         let sizes: Vec<usize> = (0..team.count()).map(|rank| (cut(rank + 1) - cut(rank)) as usize).collect();
         let counts = team.gather(&counted.counts, &sizes);
-        let extents = team.each(extent_words(&counted.extent)).into_iter().map(extent_of);
-        let words = |(place, ends): Side| {
-            [place].into_iter().chain(ends.into_iter().flatten().map(|n| i64::from(n) as u64))
-        };
-        let sides = team.gather_all(&counted.sides.into_iter().flat_map(words).collect::<Vec<_>>());
-        let corner = |of: &[u64]| std::array::from_fn(|k| of[k] as i64 as i32);
-        let sides = sides.chunks_exact(7).map(|of| (of[0], [corner(&of[1..4]), corner(&of[4..])])).collect();
+        let Extent { bounds, lowest, neighbours } = counted.extent;
+        let extents = team.gather_all(&[(bounds, lowest, neighbours)]).into_iter();
+        let extents = extents.map(|(bounds, lowest, neighbours)| Extent { bounds, lowest, neighbours });
+        let sides = team.gather_all(&counted.sides);
         let keeps_outline = !team.any(!counted.keeps_outline);
         let counted =
             Counted { counts, extent: extents.fold(Extent::NONE, Extent::or), sides, keeps_outline };
@@ -453,25 +451,6 @@ fn sides(scene: &Scene, fitted: Option<&FittedBand>, columns: Range<i32>) -> Res
     };
     let own = (0..cells.count()).filter(|&cell| own.contains(&(cells.of(cell)[0] as usize)));
     Ok(own.flat_map(of_cell).map(|(place, side)| (place, side.map(corner))).collect())
-}
-
-/// The first rank's caches: halos are measured by them.
-fn agreed_caches(team: &Team) -> Caches {
-    let Caches { whole_body, band } = Caches::here();
-    let [whole_body, band] = team.of_first([whole_body as u64, band.map_or(u64::MAX, |band| band as u64)]);
-    Caches { whole_body: whole_body as usize, band: Some(band as usize).filter(|_| band != u64::MAX) }
-}
-
-fn extent_words(Extent { bounds: (low, high), lowest, neighbours }: &Extent) -> [u64; 7] {
-    let [a, b, c, d] = [low[0], low[1], high[0], high[1]].map(f64::to_bits);
-    let [column, row] = lowest.map(|k| i64::from(k) as u64);
-    [a, b, c, d, column, row, *neighbours as u64]
-}
-
-fn extent_of([a, b, c, d, column, row, neighbours]: [u64; 7]) -> Extent {
-    let [a, b, c, d] = [a, b, c, d].map(f64::from_bits);
-    let lowest = [column, row].map(|k| k as i64 as i32);
-    Extent { bounds: ([a, b], [c, d]), lowest, neighbours: neighbours as usize }
 }
 
 /// The result of all ranks: if one refuses, all refuse with the words of the first that does.

@@ -32,10 +32,9 @@ impl Pieces {
         beyond: impl Iterator<Item = usize>,
     ) -> Self {
         let rank = team.rank() as u64;
-        let labelled: Vec<u64> =
-            beyond.flat_map(|i| [number(i) as u64, rank, u64::from(labels[i])]).collect();
+        let labelled: Vec<_> = beyond.map(|i| [number(i) as u64, rank, u64::from(labels[i])]).collect();
         let all = team.gather_all(&labelled);
-        let named: HashSet<u64> = all.chunks_exact(3).map(|of| of[0]).collect();
+        let named: HashSet<u64> = all.iter().map(|of| of[0]).collect();
         let (mut here, mut pieces): (HashMap<u64, u32>, BTreeMap<u32, u64>) = Default::default();
         for (number, label) in owned.map(|i| (number(i) as u64, labels[i])) {
             // The first of each piece of this rank.
@@ -43,28 +42,32 @@ impl Pieces {
             *first = number.min(*first);
             here.extend(named.contains(&number).then_some((number, label)));
         }
-        let pairs: BTreeSet<[u64; 4]> = all
-            .chunks_exact(3)
-            .filter_map(|of| Some([of[1], of[2], rank, u64::from(*here.get(&of[0])?)]))
-            .collect();
-        let pairs = team.gather_all(&pairs.into_iter().flatten().collect::<Vec<_>>());
-        let own: Vec<u64> =
-            pieces.into_iter().flat_map(|(label, number)| [rank, u64::from(label), number]).collect();
+        let pair = |&[number, other, label]: &[u64; 3]| {
+            Some([[other, label], [rank, u64::from(*here.get(&number)?)]])
+        };
+        let pairs: BTreeSet<[[u64; 2]; 2]> = all.iter().filter_map(pair).collect();
+        let pairs = team.gather_all(&pairs.into_iter().collect::<Vec<_>>());
+        let own: Vec<_> =
+            pieces.into_iter().map(|(label, number)| ([rank, u64::from(label)], number)).collect();
         let pieces = team.gather_all(&own);
         let numbers: BTreeMap<[u64; 2], u32> = {
-            let nodes = pieces.chunks_exact(3).map(|of| [of[0], of[1]]);
-            let ends = pairs.chunks_exact(2).map(|of| [of[0], of[1]]);
-            nodes.chain(ends).collect::<BTreeSet<_>>().into_iter().zip(0..).collect()
+            let nodes = pieces.iter().map(|(node, _)| *node);
+            nodes
+                .chain(pairs.iter().flatten().copied())
+                .collect::<BTreeSet<_>>()
+                .into_iter()
+                .zip(0..)
+                .collect()
         };
         let mut sets = DisjointSets::new(numbers.len());
-        for pair in pairs.chunks_exact(4) {
-            sets.join(numbers[&[pair[0], pair[1]]], numbers[&[pair[2], pair[3]]]);
+        for [one, other] in &pairs {
+            sets.join(numbers[one], numbers[other]);
         }
         let joined = sets.labels();
         let mut of_joined: BTreeMap<u32, u64> = BTreeMap::new();
-        for of in pieces.chunks_exact(3) {
-            let known = of_joined.entry(joined[numbers[&[of[0], of[1]]] as usize]).or_insert(of[2]);
-            *known = of[2].min(*known);
+        for (node, number) in pieces {
+            let known = of_joined.entry(joined[numbers[&node] as usize]).or_insert(number);
+            *known = number.min(*known);
         }
         let mut firsts: Vec<u64> = of_joined.values().copied().collect();
         firsts.sort_unstable();
@@ -156,11 +159,10 @@ pub fn linkage(body: &Body, (cells, incidence): (&Cells, &Incidence), team: &Tea
     let number = |cell: usize| numbers.number(cell);
     let Pieces { firsts, of_label } = Pieces::among(team, &labels, number, owned(), beyond.into_iter());
     let part: Vec<usize> = labels.iter().map(|l| of_label.get(l).copied().unwrap_or(usize::MAX)).collect();
-    let corner = |cell: usize| [number(cell) as u64, body.index(cells.of(cell)[0] as usize) as u64];
-    let is_first = |&[number, _]: &[u64; 2]| firsts.binary_search(&number).is_ok();
-    let own: Vec<u64> = owned().map(corner).filter(is_first).flatten().collect();
-    let corners: BTreeMap<u64, usize> =
-        team.gather_all(&own).chunks_exact(2).map(|of| (of[0], of[1] as usize)).collect();
+    let corner = |cell: usize| (number(cell) as u64, body.index(cells.of(cell)[0] as usize));
+    let is_first = |(number, _): &(u64, usize)| firsts.binary_search(number).is_ok();
+    let own: Vec<_> = owned().map(corner).filter(is_first).collect();
+    let corners: BTreeMap<u64, usize> = team.gather_all(&own).into_iter().collect();
     let corners: Vec<usize> = corners.into_values().collect();
     if corners.len() <= 1 {
         return (part, Linkage { corners, hinges: Vec::new() });
@@ -169,20 +171,7 @@ pub fn linkage(body: &Body, (cells, incidence): (&Cells, &Incidence), team: &Tea
         let parts = incidence.of(i).iter().map(|&cell| part[cell as usize]);
         Hinge::of((body.index(i), body.reference.get(i)), parts)
     };
-    let words = |Hinge { particle, place: [x, y], parts }: Hinge| {
-        let head = [particle as u64, x.to_bits(), y.to_bits(), parts.len() as u64];
-        head.into_iter().chain(parts.into_iter().map(|part| part as u64))
-    };
-    let own: Vec<u64> = body.owned().filter_map(hinge).flat_map(words).collect();
-    let (all, mut hinges) = (team.gather_all(&own), Vec::new());
-    let mut rest = &all[..];
-    while let [particle, x, y, count, more @ ..] = rest {
-        let (parts, after) = more.split_at(*count as usize);
-        let place = [x, y].map(|&bits| f64::from_bits(bits));
-        let parts = parts.iter().map(|&part| part as usize).collect();
-        hinges.push(Hinge { particle: *particle as usize, place, parts });
-        rest = after;
-    }
+    let mut hinges = team.gather_all(&body.owned().filter_map(hinge).collect::<Vec<_>>());
     hinges.sort_by_key(|hinge| hinge.particle);
     (part, Linkage { corners, hinges })
 }
@@ -208,27 +197,22 @@ pub fn require_held(
             holds[group] = holds[group].with(body.index(i), held[i]);
         }
     }
-    let words: Vec<u64> =
-        holds.iter().flat_map(|hold| [hold.first, hold.held, hold.whole]).map(|n| n as u64).collect();
-    let all = team.gather_all(&words);
-    let mut holds = vec![Hold::NONE; groups.len()];
-    for (k, of) in all.chunks_exact(3).enumerate() {
+    let all = team.gather_all(&holds);
+    holds.fill(Hold::NONE);
+    for (k, Hold { first, held, whole }) in all.into_iter().enumerate() {
         let hold = &mut holds[k % groups.len()];
-        let [first, held, whole] = [of[0], of[1], of[2]].map(|n| n as usize);
         *hold = Hold { first: hold.first.min(first), held: hold.held + held, whole: hold.whole + whole };
     }
     let places = || -> Vec<HeldPlace> {
-        let words = |i: usize| {
-            let ([x, y], axes) = (body.reference.get(i).map(f64::to_bits), held[i].map(u64::from));
-            let of = |&cell: &u32| [x, y, part[cell as usize] as u64, axes[0], axes[1], body.index(i) as u64];
-            incidence.of(i).iter().flat_map(of).collect::<Vec<_>>()
+        let places = |i: usize| {
+            let place =
+                move |&cell: &u32| (body.index(i), (body.reference.get(i), part[cell as usize], held[i]));
+            incidence.of(i).iter().map(place)
         };
         let own = body.owned().filter(|&i| held[i] != [false; 2]);
-        let all = team.gather_all(&own.flat_map(words).collect::<Vec<_>>());
-        let mut all: Vec<_> = all.chunks_exact(6).collect();
-        all.sort_by_key(|of| of[5]);
-        let place = |of: &[u64]| [0, 1].map(|k| f64::from_bits(of[k]));
-        all.into_iter().map(|of| (place(of), of[2] as usize, [of[3] == 1, of[4] == 1])).collect()
+        let mut all = team.gather_all(&own.flat_map(places).collect::<Vec<_>>());
+        all.sort_by_key(|(index, _)| *index);
+        all.into_iter().map(|(_, place)| place).collect()
     };
     linkage.require_held(body.bounds(), &holds, places)
 }

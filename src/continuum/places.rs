@@ -103,17 +103,10 @@ pub fn at_places(scene: &Scene, engine: &Engine, stresses: &Stresses) -> Vec<AtP
         });
         let of = |StressState { components: [xx, yy, xy], von_mises, .. }| [xx, yy, xy, von_mises];
         let [xx, yy, xy, von_mises] = found.map_or([f64::NAN; 4], of);
-        Some((k, [ux, uy, xx, yy, xy, von_mises].map(f64::to_bits)))
-    };
-    let own = around.into_iter().enumerate().filter_map(at);
-    let own: Vec<u64> = own.flat_map(|(k, words)| [k as u64].into_iter().chain(words)).collect();
-    let all = team.map_or_else(|| own.clone(), |team| team.gather_all(&own));
-    let of_words = |words: &[u64]| {
-        let k = words[0] as usize;
-        let [ux, uy, xx, yy, xy, von_mises] = std::array::from_fn(|of| f64::from_bits(words[of + 1]));
         let place = scene.record.places[k];
-        (k, AtPlace { place, displacement: [ux, uy], stress: [xx, yy, xy], von_mises })
+        Some((k, AtPlace { place, displacement: [ux, uy], stress: [xx, yy, xy], von_mises }))
     };
-    let all: BTreeMap<usize, AtPlace> = all.chunks_exact(7).map(of_words).collect();
-    all.into_values().collect()
+    let own: Vec<_> = around.into_iter().enumerate().filter_map(at).collect();
+    let all = team.map_or_else(|| own.clone(), |team| team.gather_all(&own));
+    all.into_iter().collect::<BTreeMap<_, _>>().into_values().collect()
 }

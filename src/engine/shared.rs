@@ -25,7 +25,7 @@ use crate::flock::part::Part;
 use crate::flock::vectors::{Vectors, distance};
 use crate::ranks::{Team, added};
 use crate::sweep::caches::Caches;
-use crate::sweep::domain::{Domain, Held, Needs, Share};
+use crate::sweep::domain::{Domain, Held, Share};
 use crate::sweep::{Activity, Stage, Steps};
 
 /// The particles whose positions a rank knows, now and before the last step.
@@ -135,8 +135,8 @@ impl Engine {
         let (Some((team, _)), Some(_)) = (&self.team, &self.body.part) else { return };
         let (takes_several, seen) = (self.takes_several, seen_in_a_step(&self.body, &self.flock.neighbours));
         let Some(domain) = self.sweep.domain_mut() else { return };
-        let own = domain.needs(takes_several, seen).words();
-        domain.learn(team.each(own).iter().map(Needs::of_words).collect());
+        let own = domain.needs(takes_several, seen).clone();
+        domain.learn(team.gather_all(&[own]));
         self.takes_several = domain.steps_together() > 0;
     }
 
@@ -255,9 +255,7 @@ impl Engine {
         let apart = |far: usize| distance(self.present.get(far), self.body.reference.get(far));
         let own = far.map_or((0, f64::NEG_INFINITY), |far| (self.body.id(far), apart(far)));
         let Some(team) = self.parted() else { return own };
-        let all = team.each([own.0 as u64, own.1.to_bits()]);
-        let mut all: Vec<_> =
-            all.into_iter().map(|[id, apart]| (id as usize, f64::from_bits(apart))).collect();
+        let mut all = team.gather_all(&[own]);
         all.sort_unstable_by_key(|(id, _)| *id);
         all.into_iter().fold((0, f64::NEG_INFINITY), |most, one| if one.1 > most.1 { one } else { most })
     }
@@ -312,17 +310,11 @@ pub(crate) fn of_all_parts(
     // Of a bond between two parts, which both find, the one speaks that records it.
     let is_own =
         |one: &Break| owned.contains(&Bonds::recorded_from(one.pair.map(|i| i as usize), neighbours));
-    let words_of = |Break { step, pair, place, length }: Break| {
-        let [a, b] = pair.map(|particle| body.index(particle as usize) as u64);
-        [step as u64, a, b, place[0].to_bits(), place[1].to_bits(), length.to_bits()]
-    };
-    let own: Vec<u64> = found.into_iter().filter(is_own).flat_map(words_of).collect();
-    let words = team.gather_all(&own);
-    let all = words.chunks_exact(6).map(|of| {
-        let [x, y, length] = [of[3], of[4], of[5]].map(f64::from_bits);
-        Break { step: of[0] as usize, pair: [of[1] as u32, of[2] as u32], place: [x, y], length }
-    });
-    all.collect()
+    let index = |particle: u32| body.index(particle as usize) as u32;
+    let parts = |Break { step, pair, place, length }: Break| (step, pair.map(index), place, length);
+    let own: Vec<_> = found.into_iter().filter(is_own).map(parts).collect();
+    let all = team.gather_all(&own).into_iter();
+    all.map(|(step, pair, place, length)| Break { step, pair, place, length }).collect()
 }
 
 /// The particles that those of a part see in a step that is taken by itself, as numbers of those that stand here; all of these where
@@ -345,8 +337,8 @@ impl Part {
     }
 }
 
-/// The first rank's: all must cut the body into the same bands.
-fn agreed_caches(team: &Team) -> Caches {
+/// The first rank's: all must cut the body into the same bands, and halos are measured by them.
+pub(crate) fn agreed_caches(team: &Team) -> Caches {
     let Caches { whole_body, band } = Caches::here();
     let own = [whole_body as u64, u64::from(band.is_some()), band.unwrap_or(0) as u64];
     let [whole_body, has_band, band] = team.of_first(own);

@@ -9,6 +9,7 @@
 use std::cell::LazyCell;
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::cells::{Cells, Incidence};
 use crate::flock::vectors::Vectors;
@@ -81,7 +82,7 @@ pub struct Linkage {
 }
 
 /// A particle in two or more parts.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hinge {
     /// Its index.
     pub particle: usize,
@@ -92,7 +93,7 @@ pub struct Hinge {
 }
 
 /// The particles of parts that are pinned to each other, and what holds them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Hold {
     /// The first of them.
     pub first: usize,

@@ -17,6 +17,9 @@ mod threads;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
 pub use threads::in_process;
 
 /// How numbers get from rank to rank. All ranks call the same methods in the same order.
@@ -98,11 +101,12 @@ impl Team {
         self.exchange().gather(own, counts)
     }
 
-    /// The words of all ranks, one after the other, where each has as many as it has; an exchange less where there are none.
-    pub(crate) fn gather_all(&self, own: &[u64]) -> Vec<u64> {
-        let counts: Vec<usize> =
-            self.each([own.len() as u64]).into_iter().map(|[count]| count as usize).collect();
-        if counts.iter().all(|&count| count == 0) { Vec::new() } else { self.gather(own, &counts) }
+    /// What all ranks have, one after the other, each as many as it has; an exchange less where there is none.
+    pub(crate) fn gather_all<T: Serialize + DeserializeOwned>(&self, own: &[T]) -> Vec<T> {
+        let own = if own.is_empty() { Ok(Vec::new()) } else { postcard::to_stdvec(own) };
+        let of = |bytes: Vec<u8>| -> Vec<T> { postcard::from_bytes(&bytes).expect("as it was sent") };
+        let all = self.each_bytes(&own.expect("values without maps and of known length can be written"));
+        all.into_iter().filter(|bytes| !bytes.is_empty()).flat_map(of).collect()
     }
 
     /// As many words of each rank, shape \[ranks\]\[N\].
@@ -162,21 +166,20 @@ impl Team {
         own: impl Iterator<Item = (Option<usize>, [f64; N])>,
         has_later: bool,
     ) -> [f64; N] {
-        let mut later: Vec<u64> = Vec::new();
+        let mut later: Vec<(usize, Vec<f64>)> = Vec::new();
         let before = own.filter_map(|(place, own)| match place {
             None => Some(own),
             Some(place) => {
-                later.extend([place as u64].into_iter().chain(own.map(f64::to_bits)));
+                later.push((place, own.to_vec()));
                 None
             }
         });
         let chained = self.chain(start.map(f64::to_bits), |sums| {
             before.fold(sums.map(f64::from_bits), added).map(f64::to_bits)
         });
-        let later = if has_later { self.gather_all(&later) } else { Vec::new() };
-        let mut later: Vec<&[u64]> = later.chunks_exact(N + 1).collect();
-        later.sort_unstable_by_key(|of| of[0]);
-        let numbers = later.into_iter().map(|of| std::array::from_fn(|k| f64::from_bits(of[k + 1])));
+        let mut later = if has_later { self.gather_all(&later) } else { Vec::new() };
+        later.sort_unstable_by_key(|(place, _)| *place);
+        let numbers = later.into_iter().map(|(_, of)| std::array::from_fn(|k| of[k]));
         numbers.fold(chained.map(f64::from_bits), added)
     }
 
@@ -184,6 +187,9 @@ impl Team {
     pub(crate) fn each_bytes(&self, own: &[u8]) -> Vec<Vec<u8>> {
         let lengths: Vec<usize> =
             self.each([own.len() as u64]).into_iter().map(|[length]| length as usize).collect();
+        if lengths.iter().all(|&length| length == 0) {
+            return vec![Vec::new(); lengths.len()];
+        }
         let counts: Vec<usize> = lengths.iter().map(|length| length.div_ceil(8)).collect();
         let all = self.gather(&packed(own), &counts);
         let mut rest = &all[..];

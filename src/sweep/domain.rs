@@ -6,6 +6,8 @@
 
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 use super::caches::Caches;
 use super::rows::Rows;
 use super::schedule::MOST_STEPS;
@@ -67,7 +69,7 @@ pub struct Domain {
 }
 
 /// What a rank moves and what it needs for that.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Needs {
     owned: Range<usize>,
     /// Most steps that it can take together; 0 where it looks at each.
@@ -78,9 +80,6 @@ pub struct Needs {
     /// \[[`MOST_STEPS`] + 1\].
     needed: Vec<Range<usize>>,
 }
-
-/// Words of [`Needs::words`].
-pub(crate) const NEED_WORDS: usize = 5 + 2 * (MOST_STEPS + 1);
 
 impl Needs {
     fn of(owned: Range<usize>, all: Range<usize>) -> Self {
@@ -94,21 +93,6 @@ impl Needs {
         let steps = self.steps.saturating_sub(spare);
         let needed = if steps == 0 { &self.seen } else { &self.needed[self.steps] };
         (steps, needed.len() - self.owned.len())
-    }
-
-    /// For another rank.
-    pub fn words(&self) -> [u64; NEED_WORDS] {
-        let ends = |of: &Range<usize>| [of.start as u64, of.end as u64];
-        let own = [&self.owned, &self.seen].into_iter().flat_map(ends).chain([self.steps as u64]);
-        let mut words = own.chain(self.needed.iter().flat_map(ends));
-        std::array::from_fn(|_| words.next().unwrap_or_default())
-    }
-
-    /// Of another rank.
-    pub(crate) fn of_words(words: &[u64; NEED_WORDS]) -> Self {
-        let range = |ends: &[u64]| ends[0] as usize..ends[1] as usize;
-        let needed = words[5..].chunks_exact(2).map(range).collect();
-        Self { owned: range(&words[..2]), seen: range(&words[2..4]), steps: words[4] as usize, needed }
     }
 }
 

@@ -41,9 +41,8 @@ fn samples(matrix: &Matrix) -> Vec<usize> {
     let mut seen = vec![false; matrix.rows.len()];
     samples.iter().flat_map(|&group| rows_of(group)).for_each(|row| seen[row] = true);
     if let Some(team) = matrix.team() {
-        let own = matrix.names.iter().zip(&seen).filter(|(_, seen)| **seen).flat_map(|(name, _)| *name);
-        let all = team.gather_all(&own.collect::<Vec<_>>());
-        let all: HashSet<Name> = all.chunks_exact(2).map(|name| [name[0], name[1]]).collect();
+        let own = matrix.names.iter().zip(&seen).filter(|(_, seen)| **seen).map(|(name, _)| *name);
+        let all: HashSet<Name> = team.gather_all(&own.collect::<Vec<_>>()).into_iter().collect();
         seen.iter_mut().zip(&matrix.names).for_each(|(seen, name)| *seen = all.contains(name));
     }
     let sum_of = |(row, seen): (RowRef<'_>, &bool)| if *seen { 0.0 } else { row_sum(row) };
@@ -53,9 +52,7 @@ fn samples(matrix: &Matrix) -> Vec<usize> {
     let mut odd: Vec<(f64, usize)> =
         (0..=last).filter_map(|group| odd_of(group).map(|sum| (sum, group))).collect();
     if let Some(team) = matrix.team() {
-        let own: Vec<u64> = odd.iter().flat_map(|(sum, group)| [sum.to_bits(), *group as u64]).collect();
-        let all = team.gather_all(&own);
-        odd = all.chunks_exact(2).map(|of| (f64::from_bits(of[0]), of[1] as usize)).collect();
+        odd = team.gather_all(&odd);
     }
     odd.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     samples.extend(odd.iter().take(MOST_ODD).map(|&(_, group)| group));
@@ -176,10 +173,7 @@ impl<'a, T: Real> Krylov<'a, T> {
         let own = self.groups.iter().map(of_group);
         match self.matrix.team() {
             None => own.sum(),
-            Some(team) => {
-                let own: Vec<u64> = own.map(f64::to_bits).collect();
-                team.gather_all(&own).into_iter().map(f64::from_bits).sum()
-            }
+            Some(team) => team.gather_all(&own.collect::<Vec<f64>>()).into_iter().sum(),
         }
     }
 }

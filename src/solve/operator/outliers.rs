@@ -29,10 +29,7 @@ impl Outliers {
 
     /// Those of all ranks, of which each names some: they are few, and rows lead from everywhere to them.
     pub fn among(team: &Team, own: impl Iterator<Item = (i32, [f64; 2])>) -> Self {
-        let words = |(row, [x, y]): (i32, [f64; 2])| [row as u64, x.to_bits(), y.to_bits()];
-        let all = team.gather_all(&own.flat_map(words).collect::<Vec<_>>());
-        let of = |words: &[u64]| (words[0] as i32, [f64::from_bits(words[1]), f64::from_bits(words[2])]);
-        Self::new(all.chunks_exact(3).map(of))
+        Self::new(team.gather_all(&own.collect::<Vec<_>>()))
     }
 
     /// Whether there are none.
