@@ -44,6 +44,7 @@ pub use document::Document;
 use document::find;
 pub use document::problem::{Place, Problem, SceneError};
 use raw::RawScene;
+pub use raw::{RawRecord as Record, RawStop as Stop};
 pub use validate::actions::{MOST_ACTIONS, is_changeable};
 
 /// A continuum scene, ready to be planned.
@@ -309,17 +310,6 @@ pub struct Fracture {
     pub ghosts: Ghosts,
 }
 
-/// When the run ends.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stop {
-    /// Steps after which the run ends at the latest.
-    pub steps: usize,
-    /// Largest one-step motion over spacing at which the body is in equilibrium.
-    pub tolerance: Option<f64>,
-    /// Displacement over the body's diagonal at which the run has diverged.
-    pub divergence_ratio: f64,
-}
-
 /// How the equilibrium is found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Equilibrium {
@@ -341,17 +331,4 @@ pub enum LoadSteps {
         /// Steps from one row of the response to the next.
         every: usize,
     },
-}
-
-/// The records of the run.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Record {
-    /// Ids.
-    pub probes: Vec<usize>,
-    /// \[length\]
-    pub places: Vec<[f64; 2]>,
-    /// Steps at which the configuration is drawn; the last one always is.
-    pub figures: Vec<usize>,
-    /// Steps from one VTK file to the next; 0 writes none.
-    pub vtk_every: usize,
 }

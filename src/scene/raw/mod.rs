@@ -143,7 +143,7 @@ pub struct RawCut {
 }
 
 /// When the run ends.
-#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RawStop {
     /// At the latest after this many steps [step].
@@ -166,7 +166,7 @@ impl Default for RawStop {
 }
 
 /// The records of the run.
-#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RawRecord {
     /// Ids of the particles whose coordinates and pseudo-energies are kept at every step; one that is named twice is kept once.

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use super::document::problem::{Problem, SceneError};
 use super::document::{Document, schema_of};
 use super::raw::*;
-use super::{BodySource, Fracture, PoissonTerm, Record, Scene, Stop, Weights, text};
+use super::{BodySource, Fracture, PoissonTerm, Scene, Weights, text};
 use crate::flock::body::Cut;
 use crate::flock::fracture::Threshold;
 use crate::flock::frame::FrameRule;
@@ -181,17 +181,8 @@ pub(super) fn validate(
         fracture: fracture(&raw.fracture, refuse)?,
         cuts: cuts(&raw.cuts, refuse)?,
         actions: actions::actions(&raw, (name, &document, folder), refuse)?,
-        stop: Stop {
-            steps: raw.stop.steps,
-            tolerance: raw.stop.tolerance,
-            divergence_ratio: raw.stop.divergence_ratio,
-        },
-        record: Record {
-            probes: raw.record.probes.clone(),
-            places: raw.record.places.clone(),
-            figures: raw.record.figures.clone(),
-            vtk_every: raw.record.vtk_every,
-        },
+        stop: raw.stop,
+        record: raw.record.clone(),
         lattice,
         raw,
         document,
