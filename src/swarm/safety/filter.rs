@@ -1,6 +1,6 @@
 //! The filter: one pass over the members, each with a cell of its own.
 
-use super::cell::{Cell, length, shortened};
+use super::cell::{Cell, length};
 use super::deadlock::Detour;
 use super::limits::{Limits, Place, SafetyError};
 use super::obstacles::Obstacles;
@@ -9,7 +9,7 @@ use super::ways::Ways;
 use crate::flock::grid::CellGrid;
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::vectors::{Vectors, distance};
-use crate::geometry::point::{minus, plus};
+use crate::geometry::point::minus;
 
 /// The reasons for changing a target, and other events of a tick, as bits that may be combined; those of the message `flockform_msgs/MemberState`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -249,12 +249,7 @@ impl Filter {
         self.meet(seen, wanted, period);
         safe.clone_from(seen.present);
         for (member, flags) in flags.iter_mut().enumerate() {
-            let (from, most) = self.place(seen, period, member);
-            let (mut target, changed) = self.target(seen, wanted.get(member), period, member);
-            // Nothing says that one has gone on by a limit that was higher.
-            if !self.earlier.is_empty() {
-                target = plus(from, shortened(minus(target, from), most));
-            }
+            let ([from, target], changed) = self.target(seen, wanted.get(member), period, member);
             // One that is sent nowhere may be anywhere when it is heard again.
             let sent = if seen.known[member] { target } else { [f64::NAN; 2] };
             self.sent_before.set(member, from);

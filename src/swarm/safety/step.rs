@@ -37,19 +37,19 @@ const CAST_TOLERANCE: f64 = 1e-7;
 pub(super) const TOUCHING: f64 = 1e-9;
 
 impl Filter {
-    /// The target of one member, with the reasons for changing it.
+    /// The place from which a member is sent on and its target \[m, world frame\], with the reasons for changing that.
     pub(super) fn target(
         &mut self,
         seen: &Seen,
         wanted: [f64; 2],
         period: f64,
         member: usize,
-    ) -> ([f64; 2], Flags) {
+    ) -> ([[f64; 2]; 2], Flags) {
         let pose = seen.present.get(member);
         if !seen.known[member] || !minus(wanted, pose).iter().all(|value| value.is_finite()) {
             self.detours[member].reset();
             self.cell.planes.clear();
-            return (pose, Flags(Flags::HELD));
+            return ([pose; 2], Flags(Flags::HELD));
         }
         let brakes = self.crowd.brakes;
         let (here, most) = self.place(seen, period, member);
@@ -85,18 +85,19 @@ impl Filter {
         }
         // An unchanged way gives the wanted target to the last bit.
         let target = if step == way { wanted } else { plus(here, step) };
-        (target, flags)
+        ([here, target], flags)
     }
 
     /// The place from which a member is sent on \[m, world frame\], and how far it may be sent from there \[m\]: that of its pose, or,
     /// where poses are late or noisy, the one to which it was last sent, if it is there or on its way there. The step from where it is
     /// seen is not the step it makes: each would lose what noise puts the pose back by, and gain nothing where it puts it forward,
     /// since the member goes no faster, and one that turns first would turn after the noise. One that lags is waited for.
-    pub(super) fn place(&self, seen: &Seen, period: f64, member: usize) -> ([f64; 2], f64) {
+    fn place(&self, seen: &Seen, period: f64, member: usize) -> ([f64; 2], f64) {
         let (pose, last) = (seen.present.get(member), self.sent.get(member));
         let (ahead, margin, most) =
             (self.ahead(seen, member), self.limits.margin(), self.limits.speed * period);
-        let from_pose = (pose, self.longest_step(period, ahead));
+        // Nothing says that one that is not on its way has gone on by a limit that was higher.
+        let from_pose = (pose, most + if ahead > 0.0 { self.limits.speed * ahead } else { 0.0 });
         if self.crowd.brakes || !last.iter().all(|x| x.is_finite()) {
             return from_pose;
         }
