@@ -199,6 +199,16 @@ fn a_plan_and_a_run_caution_against_what_does_not_suit_the_body() {
     let short = cautions(&pulled([6, 4], 0.1, "[fracture]; distance = 0.9"));
     assert!(short.contains("fracture.distance = 0.9") && short.contains("38 bonds"), "{short}");
     assert!(!cautions(&pulled([6, 4], 0.1, "[fracture]; distance = 1.1")).contains("fracture.distance"));
+    let framed = cautions(&load("tension", &["record.probes=[67,12,1]"]));
+    assert!(framed.contains("record.probes has points of the frame, 2 in all, the first 12:"), "{framed}");
+    assert!(!cautions(&load("second-gradient", &[])).contains("record.probes"));
+    let mirrored = |kind: &str| cautions(&load(kind, &["fracture={distance=3.0,ghosts=\"mirrored\"}"]));
+    assert!(mirrored("lattice-honeycomb").contains("do not lie opposite each other: fracture.ghosts"));
+    assert!(!mirrored("lattice-square").contains("fracture.ghosts"));
+    // The lattice ends 0.9 before the shape does, along both axes.
+    let short = "body={shape={kind='rectangle',max=[6.9,6.9]},outline='lattice'}";
+    let short = cautions(&load("bar", &["lattice={kind='square',spacing=1.0}", short, "record={}"]));
+    assert!(short.contains("its boundary lies up to 1.273 "), "{short}");
     let world = "[rule]; mean = { kind = 'geometric', origin = 'world' };";
     let unmoved = cautions(&pulled([4, 3], 0.1, world));
     assert!(!unmoved.contains("followers"), "{unmoved}");
