@@ -222,6 +222,41 @@ fn a_plan_and_a_run_caution_against_what_does_not_suit_the_body() {
 }
 
 #[test]
+fn what_over_relaxes_counts_in_the_damping_that_is_stated_and_taken() {
+    let cautions = |more: &str| {
+        let over = format!("[rule]; feedback = {{ factor = 0.5, reference = 'previous' }}; {more}");
+        let scene = pulled([8, 8], 0.1, &over);
+        PlanReport::new(&scene, &planned(&scene)).expect("planned").cautions.join("\n")
+    };
+    let stated = cautions("[update]; damping = 0.9");
+    assert!(stated.contains("diverges unless damped below 0.6667"), "{stated}");
+    assert_eq!(cautions("[update]; damping = 0.6"), "");
+    let gradient = "[neighbours]; kind = 'collinear'
+                    [rule]; weights = { kind = 'gradient', length = 0.6 }; feedback = { factor = 0.5, reference = 'previous' }
+                    [stop]; steps = 600";
+    let outcome = run_out(&pulled([9, 9], 1e-3, gradient));
+    assert!((outcome.engine.update().damping - 0.4).abs() < 1e-15);
+    assert_eq!(outcome.reason, StopReason::Steps);
+}
+
+#[test]
+fn a_motion_that_ends_at_the_last_step_there_is_goes_on() {
+    let last = format!(
+        "motion = {{ kind = 'keyframes', frames = [{{ step = {}, displacement = [0.1, 0.0] }}] }}",
+        u64::MAX
+    );
+    let more = format!("{RIGHT} role = 'leader'; from = 5; {last}; [stop]; steps = 30; tolerance = 1e-6");
+    assert_eq!(run_out(&pulled([4, 3], 0.0, &more)).engine.step(), 30);
+}
+
+#[test]
+fn the_energy_of_a_body_that_is_all_gone_is_zero_without_a_sign() {
+    let gone = "[fracture]; [[roles]]; region = { kind = 'all' }; role = 'ghost'; [stop]; steps = 1";
+    let energies = run_out(&pulled([3, 3], 0.1, gone)).engine.energies();
+    assert_eq!(energies.map(f64::to_bits), [0; 2]);
+}
+
+#[test]
 fn a_material_whose_cells_lock_in_shear_is_a_caution() {
     let is_cautioned = |more: &str| {
         let more = format!(

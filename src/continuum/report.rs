@@ -17,7 +17,7 @@ use crate::engine::setup::Setup;
 use crate::flock::fracture::Threshold;
 use crate::flock::law::Weights;
 use crate::flock::role::Role;
-use crate::flock::rules::{FeedbackReference, Mean, Rotation};
+use crate::flock::rules::{Mean, Rotation};
 use crate::geometry::point::area;
 use crate::material::outline_loads::Resultant;
 use crate::scene::raw::{RawAction, RawActionKind, RawLoad};
@@ -305,7 +305,8 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
         ));
     }
     let rule = plan.setup.flock.rule;
-    let undamped = plan.setup.update.order == Order::Synchronous && plan.setup.update.damping == 1.0;
+    let is_synchronous = plan.setup.update.order == Order::Synchronous;
+    let undamped = is_synchronous && plan.setup.update.damping == 1.0;
     if undamped && matches!(rule.mean, Mean::Distance { power } if power > 0.0) {
         cautions.push(
             "weights that grow with distance are marginal in a synchronous update: large deformations do not settle; \
@@ -313,16 +314,17 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
                 .into(),
         );
     }
-    if undamped && rule.feedback.is_some_and(|f| f.reference == FeedbackReference::Previous && f.factor > 0.0)
-    {
-        cautions.push("over-relaxation in a synchronous update makes the fastest mode grow".into());
-    }
     if plan.setup.present_radius.is_some() && rule.mean == Mean::Barycentre {
         cautions.push(
             "the barycentre of all particles in range keeps no distance: the body contracts; use rule.mean.kind = \"spaced\"".into(),
         );
     }
-    cautions.extend(bulk_response::cautions(scene));
+    let of_waves = bulk_response::cautions(scene);
+    let over = scene.over_relaxation();
+    if of_waves.is_empty() && is_synchronous && over > 1.0 && plan.setup.update.damping * over > 1.0 {
+        cautions.push("over-relaxation in a synchronous update makes the fastest mode grow".into());
+    }
+    cautions.extend(of_waves);
     cautions.extend(dead_pressure(scene));
     cautions.extend(whole_cells(scene));
     cautions.extend(uneven_sides(scene));

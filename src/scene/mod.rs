@@ -128,6 +128,11 @@ impl Scene {
         farthest_seeing(self.material.as_ref(), &self.inclusions)
     }
 
+    /// The factor by which feedback enlarges each update, as a damping above 1 would \[1\].
+    pub(crate) fn over_relaxation(&self) -> f64 {
+        self.feedback.map_or(1.0, |feedback| feedback.over_relaxation())
+    }
+
     /// Which turns of the body are no strain.
     pub fn rotation(&self) -> Rotation {
         self.mean.rotation()
