@@ -20,6 +20,7 @@ use crate::flock::role::Role;
 use crate::flock::rules::{Mean, Rotation};
 use crate::geometry::point::area;
 use crate::material::outline_loads::Resultant;
+use crate::scene::document::{find, split_assignment};
 use crate::scene::raw::{RawAction, RawActionKind, RawLoad};
 use crate::scene::text::{counted, percent};
 use crate::scene::{LoadSteps, Scene, SceneError, Weights as SceneWeights};
@@ -137,17 +138,29 @@ impl PlanReport {
     }
 }
 
-/// The first action that sets a key, or something in it: its number, and the step from which on it holds.
+/// The first action that sets a key, something in it, or it within another: its number, and the step from which on it holds.
 fn set_later(scene: &Scene, key: &str) -> Option<(usize, usize)> {
     let is_in_it = |rest: &str| rest.starts_with(['=', '.', '[']);
     let sets = |action: &RawAction| match &action.what {
-        RawActionKind::Set { keys } => keys
-            .iter()
-            .any(|set| set.trim_start().strip_prefix(key).is_some_and(|rest| is_in_it(rest.trim_start()))),
+        RawActionKind::Set { keys } => keys.iter().any(|set| {
+            set.trim_start().strip_prefix(key).is_some_and(|rest| is_in_it(rest.trim_start()))
+                || is_within(set, key)
+        }),
         RawActionKind::Cut { .. } => false,
     };
     let found = scene.raw.actions.iter().enumerate().find(|(_, action)| sets(action));
     found.map(|(k, action)| (k, action.at))
+}
+
+/// Whether what is set is a table that has the key in it.
+fn is_within(set: &str, key: &str) -> bool {
+    let within = || {
+        let (path, value) = split_assignment(set)?;
+        let rest = key.strip_prefix(path)?.strip_prefix('.')?;
+        let value = toml::from_str::<serde_json::Value>(&format!("value = {value}")).ok()?;
+        find(&value, &format!("value.{rest}")).map(|_| ())
+    };
+    within().is_some()
 }
 
 /// What is done to the body while it is stepped.

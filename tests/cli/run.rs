@@ -462,6 +462,12 @@ fn a_plan_says_what_is_modelled_left_out_and_why() {
         "because of actions[0]",
     ];
     assert!(words.iter().all(|words| said.contains(words)) && !said.contains("not overshot"), "{said}");
+    let within = later.replace(
+        "'rule.feedback.factor=-0.1'",
+        "'rule={mean={kind=\"barycentre\"},poisson={axis=\"x\",k=0.1}}'",
+    );
+    let said = done(&["plan", "tension", "--set", &within], folder.path());
+    assert!(said.contains("rule.poisson from step 21 on") && said.contains("  rule.feedback "), "{said}");
 }
 
 #[test]
