@@ -121,8 +121,10 @@ impl PlanReport {
         let anew =
             plan.setup.present_radius.map(|r| format!("neighbours found anew at every step within {r}"));
         self.models_or_not(anew, "neighbours.kind = \"dynamic\"", "neighbours are those of the reference");
-        let vtk = (scene.record.vtk_every > 0)
-            .then(|| format!("ParaView files every {} steps", scene.record.vtk_every));
+        let vtk = (scene.record.vtk_every > 0).then(|| match scene.is_solved_at_once() {
+            true => "a ParaView file of the equilibrium".to_owned(),
+            false => format!("ParaView files every {} {}s", scene.record.vtk_every, scene.counts()),
+        });
         self.models_or_not(vtk, "record.vtk_every", "no ParaView files are written");
     }
 

@@ -498,6 +498,25 @@ fn what_comes_after_the_last_step_is_warned_of_by_the_plan_and_the_run() {
 }
 
 #[test]
+fn keys_of_steps_that_an_equilibrium_does_not_take_are_warned_of_by_the_plan_and_the_run() {
+    let folder = temporary();
+    let set = [
+        "update={ order = \"sequential\", damping = 0.3 }",
+        "stop={ steps = 7, tolerance = 1e-3 }",
+        "record={ figures = [3, 7], vtk_every = 5 }",
+    ];
+    let set: Vec<&str> = set.iter().flat_map(|text| ["--set", *text]).collect();
+    let words = "caution: without effect on an equilibrium that is solved for: update.order, update.damping, stop.tolerance, \
+                 record.figures[0] = 3; leave [equilibrium] out to step\n";
+    for command in [&["plan", "bar"][..], &["run", "bar", "--no-report", "--figures", "none", "--out", "o"]] {
+        let said = done(&[command, &set].concat(), folder.path());
+        assert!(said.contains(words), "{said}");
+        assert!(command[0] == "run" || said.contains("a ParaView file of the equilibrium"), "{said}");
+    }
+    assert!(!done(&["plan", "bar"], folder.path()).contains("without effect"));
+}
+
+#[test]
 fn cuts_that_miss_the_body_are_warned_of_by_the_plan_and_the_run() {
     let folder = temporary();
     let set = [
