@@ -229,6 +229,14 @@ fn a_radius_beyond_everything_is_refused_at_once() {
 }
 
 #[test]
+fn a_body_that_nothing_holds_is_refused_with_the_remedy() {
+    let sets = ["roles=[]", "equilibrium={}", "record={}"];
+    let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", *set]).collect();
+    let words = ["connected to no held particle", "help: clamp or lead particles of each part of the body"];
+    refused(&[&["run", "tension"][..], &sets].concat(), &words);
+}
+
+#[test]
 fn shapes_that_no_lattice_follows_are_refused_by_name_and_place() {
     let plate = "shape = { kind = \"rectangle\", max = [20.0, 10.0] }";
     let disc = |centre: [f64; 2], radius: f64| {
