@@ -222,7 +222,7 @@ pub enum Weights {
 /// The Poisson term (Eq. 2) before the body's width is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoissonTerm {
-    /// Response `K` \[1\]; negative draws the sides together when pulled.
+    /// Response `K` \[1\]; negative draws the sides together where particles move along the axis, else apart.
     pub k: f64,
     /// The axis whose displacement acts.
     pub axis: Axis,
