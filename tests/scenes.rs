@@ -199,6 +199,16 @@ fn a_plan_and_a_run_caution_against_what_does_not_suit_the_body() {
     let short = cautions(&pulled([6, 4], 0.1, "[fracture]; distance = 0.9"));
     assert!(short.contains("fracture.distance = 0.9") && short.contains("38 bonds"), "{short}");
     assert!(!cautions(&pulled([6, 4], 0.1, "[fracture]; distance = 1.1")).contains("fracture.distance"));
+    let framed = cautions(&load("tension", &["record.probes=[67,12,1]"]));
+    assert!(framed.contains("record.probes has points of the frame, 2 in all, the first 12:"), "{framed}");
+    assert!(!cautions(&load("second-gradient", &[])).contains("record.probes"));
+    let mirrored = |kind: &str| cautions(&load(kind, &["fracture={distance=3.0,ghosts=\"mirrored\"}"]));
+    assert!(mirrored("lattice-honeycomb").contains("do not lie opposite each other: fracture.ghosts"));
+    assert!(!mirrored("lattice-square").contains("fracture.ghosts"));
+    // The lattice ends 0.9 before the shape does, along both axes.
+    let short = "body={shape={kind='rectangle',max=[6.9,6.9]},outline='lattice'}";
+    let short = cautions(&load("bar", &["lattice={kind='square',spacing=1.0}", short, "record={}"]));
+    assert!(short.contains("its boundary lies up to 1.273 "), "{short}");
     let world = "[rule]; mean = { kind = 'geometric', origin = 'world' };";
     let unmoved = cautions(&pulled([4, 3], 0.1, world));
     assert!(!unmoved.contains("followers"), "{unmoved}");
@@ -209,6 +219,41 @@ fn a_plan_and_a_run_caution_against_what_does_not_suit_the_body() {
     let moved = run_out(&negative);
     let [dx, dy] = displacement(&moved.engine, 4);
     assert!(dx > 0.0 && dy == 0.0, "{dx} {dy}");
+}
+
+#[test]
+fn what_over_relaxes_counts_in_the_damping_that_is_stated_and_taken() {
+    let cautions = |more: &str| {
+        let over = format!("[rule]; feedback = {{ factor = 0.5, reference = 'previous' }}; {more}");
+        let scene = pulled([8, 8], 0.1, &over);
+        PlanReport::new(&scene, &planned(&scene)).expect("planned").cautions.join("\n")
+    };
+    let stated = cautions("[update]; damping = 0.9");
+    assert!(stated.contains("diverges unless damped below 0.6667"), "{stated}");
+    assert_eq!(cautions("[update]; damping = 0.6"), "");
+    let gradient = "[neighbours]; kind = 'collinear'
+                    [rule]; weights = { kind = 'gradient', length = 0.6 }; feedback = { factor = 0.5, reference = 'previous' }
+                    [stop]; steps = 600";
+    let outcome = run_out(&pulled([9, 9], 1e-3, gradient));
+    assert!((outcome.engine.update().damping - 0.4).abs() < 1e-15);
+    assert_eq!(outcome.reason, StopReason::Steps);
+}
+
+#[test]
+fn a_motion_that_ends_at_the_last_step_there_is_goes_on() {
+    let last = format!(
+        "motion = {{ kind = 'keyframes', frames = [{{ step = {}, displacement = [0.1, 0.0] }}] }}",
+        u64::MAX
+    );
+    let more = format!("{RIGHT} role = 'leader'; from = 5; {last}; [stop]; steps = 30; tolerance = 1e-6");
+    assert_eq!(run_out(&pulled([4, 3], 0.0, &more)).engine.step(), 30);
+}
+
+#[test]
+fn the_energy_of_a_body_that_is_all_gone_is_zero_without_a_sign() {
+    let gone = "[fracture]; [[roles]]; region = { kind = 'all' }; role = 'ghost'; [stop]; steps = 1";
+    let energies = run_out(&pulled([3, 3], 0.1, gone)).engine.energies();
+    assert_eq!(energies.map(f64::to_bits), [0; 2]);
 }
 
 #[test]

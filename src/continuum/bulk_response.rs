@@ -16,6 +16,13 @@ use crate::sweep::Order;
 /// # Errors
 /// Refuses rules that are no homogeneous material, naming the key that makes them so.
 pub fn material(scene: &Scene) -> Result<MaterialReport, SceneError> {
+    let mut report = undamped(scene)?;
+    let over = scene.over_relaxation();
+    report.waves.damping_limit = report.waves.damping_limit.filter(|_| over > 0.0).map(|limit| limit / over);
+    Ok(report)
+}
+
+fn undamped(scene: &Scene) -> Result<MaterialReport, SceneError> {
     if let (Mean::Material { .. }, Some(elastic)) = (scene.mean, &scene.material) {
         let report = MaterialReport::of_material(&scene.lattice, elastic);
         let mut report =
@@ -182,8 +189,8 @@ pub(super) fn require_damped(scene: &Scene, gradient: &GradientWeights) -> Resul
         return Ok(());
     }
     let crystal = gradient.crystal(&scene.lattice).map_err(|error| refuse_gradient(scene, &error))?;
-    let limit = crystal.zone().map_or(SAFE_DAMPING, |zone| zone.damping_limit);
-    if scene.update.damping < limit {
+    let limit = crystal.zone().map_or(SAFE_DAMPING, |zone| zone.damping_limit) / scene.over_relaxation();
+    if scene.update.damping < limit || scene.over_relaxation() <= 0.0 {
         return Ok(());
     }
     let message = format!(
@@ -202,7 +209,7 @@ pub(super) fn cautions(scene: &Scene) -> Vec<String> {
     // Rules that have no waves (not symmetric, say) are no error here.
     let Some((crystal, zone)) = waves_in_doubt(scene) else { return Vec::new() };
     let gradient = matches!(scene.weights, Some(Weights::Gradient { .. }));
-    let damping = scene.update.damping;
+    let (damping, over) = (scene.update.damping, scene.over_relaxation());
     if !zone.stable || crystal.effective() == Err(HomogeniseError::NoStiffness) {
         let length = std::f64::consts::TAU / zone.worst[0].hypot(zone.worst[1]);
         return vec![format!(
@@ -211,15 +218,16 @@ pub(super) fn cautions(scene: &Scene) -> Vec<String> {
             scene.unit()
         )];
     }
-    if scene.update.order == Order::Synchronous && damping > zone.damping_limit * (1.0 + 1e-9) {
+    if scene.update.order == Order::Synchronous && damping * over > zone.damping_limit * (1.0 + 1e-9) {
         return vec![format!(
             "a synchronous update of these weights diverges unless damped below {:.4}: set update.damping or use update.order = \"sequential\"",
-            zone.damping_limit
+            zone.damping_limit / over
         )];
     }
-    if gradient && scene.update.order == Order::Synchronous && damping >= SAFE_DAMPING {
+    if gradient && scene.update.order == Order::Synchronous && damping * over >= SAFE_DAMPING {
+        let limit = if over == 1.0 { "2/3".to_owned() } else { format!("{:.4}", SAFE_DAMPING / over) };
         return vec![format!(
-            "a synchronous update of a second gradient is stable on any body only if damped below 2/3; here damping is {damping}, \
+            "a synchronous update of a second gradient is stable on any body only if damped below {limit}; here damping is {damping}, \
              and edges may grow"
         )];
     }
@@ -236,7 +244,9 @@ fn waves_in_doubt(scene: &Scene) -> Option<(Crystal, Zone)> {
     }
     let crystal = scalar_crystal(scene).ok()?;
     let positive = crystal.bonds.iter().flatten().all(|bond| bond.block[0][0] >= 0.0);
-    if positive && (scene.update.order == Order::Sequential || scene.update.damping <= 1.0) {
+    if positive
+        && (scene.update.order == Order::Sequential || scene.update.damping * scene.over_relaxation() <= 1.0)
+    {
         return None;
     }
     let zone = crystal.zone().ok()?;

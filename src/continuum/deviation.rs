@@ -2,7 +2,7 @@
 
 use super::plan::Plan;
 use crate::flock::vectors::distance;
-use crate::geometry::locate::Finder;
+use crate::geometry::locate::{Finder, tree_of};
 use crate::geometry::outline::Outline;
 use crate::geometry::piece::Piece;
 use crate::geometry::point::area;
@@ -16,7 +16,7 @@ const MOST_DISTANCES: usize = 10_000_000;
 pub struct Deviation {
     /// Area of the cells over that of the shape, less one \[1\].
     pub area: f64,
-    /// Largest distance of the cells' boundary from the outline \[length\].
+    /// Largest distance of the cells' boundary from the outline, and of the outline from that boundary \[length\].
     pub distance: f64,
     /// The same over the square root of the shape's area \[1\].
     pub distance_rel: f64,
@@ -34,7 +34,8 @@ impl Deviation {
     }
 }
 
-/// Largest distance of ends and middles of the boundary's sides from the outline \[length\].
+/// Largest distance of ends and middles of the boundary's sides from the outline, and of places on that, half a spacing
+/// apart, from the sides \[length\].
 fn farthest(plan: &Plan, cells: &Cells, outline: &Outline) -> f64 {
     let reference = &plan.setup.body.reference;
     let sides = cells.boundary_sides(&cells.incidence(reference.len()));
@@ -46,7 +47,18 @@ fn farthest(plan: &Plan, cells: &Cells, outline: &Outline) -> f64 {
         let middle = [0, 1].map(|k| 0.5 * (a[k] + b[k]));
         [a, middle].into_iter().map(|p| finder.nearest(p).1).fold(0.0, f64::max)
     };
-    sides.iter().step_by(stride).map(off).fold(0.0, f64::max)
+    let of_sides = sides.iter().step_by(stride).map(off).fold(0.0, f64::max);
+    let edge = |[a, b]: &[u32; 2]| Piece::edge(reference.get(*a as usize), reference.get(*b as usize));
+    let edges: Vec<Piece> = sides.iter().map(edge).collect();
+    let tree = tree_of(edges.iter());
+    let away =
+        |p| tree.nearest(p, |k| distance(edges[k].point(edges[k].nearest(p)), p)).map(|(_, away)| away);
+    let grain = 0.5 * plan.setup.body.lattice.spacing();
+    let places = outline.pieces().flat_map(|(.., piece)| {
+        let parts = (piece.length() / grain).ceil().clamp(2.0, MOST_DISTANCES as f64) as usize;
+        (0..parts).map(move |k| piece.point(k as f64 / parts as f64))
+    });
+    places.filter_map(away).fold(of_sides, f64::max)
 }
 
 /// The pieces of an outline as a scene names them, a line each, at most so many.

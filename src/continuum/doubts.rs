@@ -1,11 +1,12 @@
-//! Means, thresholds and materials that do not suit the body, and roles without effect.
+//! Means, thresholds and materials that do not suit the body, roles without effect, and probes of the frame.
 
 use super::layout;
 #[cfg(feature = "export")]
 use crate::engine::Engine;
 use crate::engine::setup::Setup;
 use crate::flock::body::Body;
-use crate::flock::fracture::Threshold;
+use crate::flock::fracture::{Ghosts, Threshold};
+use crate::flock::lattice::LatticeKind;
 use crate::flock::law::Flock;
 use crate::flock::role::Role;
 use crate::flock::vectors::{Vectors, distance};
@@ -83,16 +84,43 @@ fn locking(scene: &Scene) -> Option<String> {
     })
 }
 
+/// Says that ghosts are not mirrored where no neighbour lies opposite.
+fn unmirrored(scene: &Scene) -> Option<String> {
+    scene.fracture.filter(|fracture| fracture.ghosts == Ghosts::Mirrored)?;
+    let is_honeycomb = matches!(scene.lattice.kind(), LatticeKind::Honeycomb { .. });
+    let lacking = match scene.is_of_points() {
+        true => "points have hardly any neighbours that lie opposite",
+        false if is_honeycomb => "the nearest neighbours on a honeycomb do not lie opposite each other",
+        false => return None,
+    };
+    Some(format!("{lacking}: fracture.ghosts = \"mirrored\" is \"lattice\" there"))
+}
+
+/// Names probed points of the frame; `any` says whether one of the ranks has found something.
+fn framed_probes(scene: &Scene, body: &Body, any: impl Fn(bool) -> bool) -> Option<String> {
+    scene.frame?;
+    let is_framed = |id: &&usize| any(body.particle(**id).is_some_and(|particle| body.is_frame[particle]));
+    let framed: Vec<&usize> = scene.record.probes.iter().filter(is_framed).collect();
+    framed.first().map(|first| {
+        format!(
+            "record.probes has points of the frame, {} in all, the first {first}: their PE1 is always 0 and their PE2 in no \
+             sum; name particles of the body",
+            framed.len()
+        )
+    })
+}
+
 /// The warnings before a run.
 pub(crate) fn planned(scene: &Scene, setup: &Setup) -> Vec<String> {
     let Setup { body, flock, roles, changes, .. } = setup;
-    let mut cautions = Vec::from_iter(locking(scene));
+    let mut cautions: Vec<String> = locking(scene).into_iter().chain(unmirrored(scene)).collect();
     // A part does not see the others.
     if body.part.is_some() {
         return cautions;
     }
     cautions.extend(Doubts::of(body, flock, roles, &body.reference).cautions(scene));
     cautions.extend(layout::roles::cautions(changes, body, None));
+    cautions.extend(framed_probes(scene, body, |own| own));
     cautions
 }
 
@@ -103,7 +131,8 @@ pub(crate) fn seen(scene: &Scene, engine: &Engine) -> Vec<String> {
         Doubts::of(engine.body(), engine.flock(), engine.roles(), engine.present());
     let [followers, unmoved, long] = [followers, unmoved, long].map(|own| engine.count_of_parts(own));
     let mut cautions = Doubts { followers, unmoved, long }.cautions(scene);
-    cautions.extend(locking(scene));
+    cautions.extend(locking(scene).into_iter().chain(unmirrored(scene)));
     cautions.extend(layout::roles::cautions(engine.changes(), engine.body(), engine.parted()));
+    cautions.extend(framed_probes(scene, engine.body(), |own| engine.any_of_parts(own)));
     cautions
 }

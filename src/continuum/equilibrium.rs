@@ -271,6 +271,8 @@ fn refuse(scene: &Scene, error: &SolveError) -> SceneError {
             "use equilibrium.precision = \"f64\", or a larger equilibrium.tolerance"
         }
         (SolveError::NothingFollows, _) => "let particles follow, or leave [equilibrium] out to step",
+        (SolveError::Adrift { .. }, _) => "clamp or lead particles of each part of the body",
+        (SolveError::Loose { .. }, _) => "clamp or lead it, or give it weights whose sum is positive",
         (SolveError::NotPositive { solver: Solver::Direct, .. }, _) => {
             "add supports, or bring the stiffnesses closer together"
         }

@@ -8,7 +8,7 @@ pub mod roles;
 use std::sync::Arc;
 
 use self::refusals::{
-    CORNERS, refuse_body, refuse_fit, refuse_outline, refuse_pieces, require_cell_neighbours,
+    CORNERS, refuse_body, refuse_fit, refuse_outline, refuse_pieces, require_cell_neighbours, require_holes,
     require_in_range, require_resolved,
 };
 use crate::flock::body::{Body, BodyError, Cut, OutlineParticles};
@@ -118,6 +118,9 @@ impl Layout {
         boundary: Option<Arc<Boundary>>,
     ) -> Result<Self, SceneError> {
         require_resolved(scene, &body)?;
+        if kept.is_none() {
+            require_holes(scene)?;
+        }
         let mut cells = scene.material.as_ref().map(|_| Cells::of_body(&body));
         let (outline, partition) = match (&scene.body, &cells, kept) {
             (_, _, Some((outline, partition))) => {

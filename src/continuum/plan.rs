@@ -463,7 +463,9 @@ pub(super) fn update(
     match weights {
         Weights::Matrix(weights) if is_open && scene.equilibrium.is_none() => {
             let turned = if weights.cells.is_some() { OF_TURNED_CELLS } else { 1.0 };
-            Update { order, damping: turned * along_outline(body, neighbours, weights, damping, team) }
+            let over = scene.over_relaxation().max(1.0);
+            let along = along_outline(body, neighbours, weights, damping * over, team) / over;
+            Update { order, damping: turned * along }
         }
         _ => scene.update,
     }

@@ -17,9 +17,10 @@ use crate::engine::setup::Setup;
 use crate::flock::fracture::Threshold;
 use crate::flock::law::Weights;
 use crate::flock::role::Role;
-use crate::flock::rules::{FeedbackReference, Mean, Rotation};
+use crate::flock::rules::{Mean, Rotation};
 use crate::geometry::point::area;
 use crate::material::outline_loads::Resultant;
+use crate::scene::document::{find, split_assignment};
 use crate::scene::raw::{RawAction, RawActionKind, RawLoad};
 use crate::scene::text::{counted, percent};
 use crate::scene::{LoadSteps, Scene, SceneError, Weights as SceneWeights};
@@ -120,8 +121,10 @@ impl PlanReport {
         let anew =
             plan.setup.present_radius.map(|r| format!("neighbours found anew at every step within {r}"));
         self.models_or_not(anew, "neighbours.kind = \"dynamic\"", "neighbours are those of the reference");
-        let vtk = (scene.record.vtk_every > 0)
-            .then(|| format!("ParaView files every {} steps", scene.record.vtk_every));
+        let vtk = (scene.record.vtk_every > 0).then(|| match scene.is_solved_at_once() {
+            true => "a ParaView file of the equilibrium".to_owned(),
+            false => format!("ParaView files every {} {}s", scene.record.vtk_every, scene.counts()),
+        });
         self.models_or_not(vtk, "record.vtk_every", "no ParaView files are written");
     }
 
@@ -137,17 +140,29 @@ impl PlanReport {
     }
 }
 
-/// The first action that sets a key, or something in it: its number, and the step from which on it holds.
+/// The first action that sets a key, something in it, or it within another: its number, and the step from which on it holds.
 fn set_later(scene: &Scene, key: &str) -> Option<(usize, usize)> {
     let is_in_it = |rest: &str| rest.starts_with(['=', '.', '[']);
     let sets = |action: &RawAction| match &action.what {
-        RawActionKind::Set { keys } => keys
-            .iter()
-            .any(|set| set.trim_start().strip_prefix(key).is_some_and(|rest| is_in_it(rest.trim_start()))),
+        RawActionKind::Set { keys } => keys.iter().any(|set| {
+            set.trim_start().strip_prefix(key).is_some_and(|rest| is_in_it(rest.trim_start()))
+                || is_within(set, key)
+        }),
         RawActionKind::Cut { .. } => false,
     };
     let found = scene.raw.actions.iter().enumerate().find(|(_, action)| sets(action));
     found.map(|(k, action)| (k, action.at))
+}
+
+/// Whether what is set is a table that has the key in it.
+fn is_within(set: &str, key: &str) -> bool {
+    let within = || {
+        let (path, value) = split_assignment(set)?;
+        let rest = key.strip_prefix(path)?.strip_prefix('.')?;
+        let value = toml::from_str::<serde_json::Value>(&format!("value = {value}")).ok()?;
+        find(&value, &format!("value.{rest}")).map(|_| ())
+    };
+    within().is_some()
 }
 
 /// What is done to the body while it is stepped.
@@ -305,7 +320,8 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
         ));
     }
     let rule = plan.setup.flock.rule;
-    let undamped = plan.setup.update.order == Order::Synchronous && plan.setup.update.damping == 1.0;
+    let is_synchronous = plan.setup.update.order == Order::Synchronous;
+    let undamped = is_synchronous && plan.setup.update.damping == 1.0;
     if undamped && matches!(rule.mean, Mean::Distance { power } if power > 0.0) {
         cautions.push(
             "weights that grow with distance are marginal in a synchronous update: large deformations do not settle; \
@@ -313,16 +329,17 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
                 .into(),
         );
     }
-    if undamped && rule.feedback.is_some_and(|f| f.reference == FeedbackReference::Previous && f.factor > 0.0)
-    {
-        cautions.push("over-relaxation in a synchronous update makes the fastest mode grow".into());
-    }
     if plan.setup.present_radius.is_some() && rule.mean == Mean::Barycentre {
         cautions.push(
             "the barycentre of all particles in range keeps no distance: the body contracts; use rule.mean.kind = \"spaced\"".into(),
         );
     }
-    cautions.extend(bulk_response::cautions(scene));
+    let of_waves = bulk_response::cautions(scene);
+    let over = scene.over_relaxation();
+    if of_waves.is_empty() && is_synchronous && over > 1.0 && plan.setup.update.damping * over > 1.0 {
+        cautions.push("over-relaxation in a synchronous update makes the fastest mode grow".into());
+    }
+    cautions.extend(of_waves);
     cautions.extend(dead_pressure(scene));
     cautions.extend(whole_cells(scene));
     cautions.extend(uneven_sides(scene));

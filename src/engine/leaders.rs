@@ -159,7 +159,7 @@ impl Engine {
         match duration {
             None => false,
             Some(None) => true,
-            Some(Some(duration)) => since + duration > self.step,
+            Some(Some(duration)) => since.saturating_add(duration) > self.step,
         }
     }
 

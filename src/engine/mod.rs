@@ -278,7 +278,8 @@ impl Engine {
 
     /// Sums of PE1 \[length^2\] and PE2 \[length\] over the body, in order of index.
     pub fn energies(&self) -> [f64; 2] {
-        self.sum_of_particles(|i| [self.pe1(i), self.pe2(i)])
+        // Without the sign of a zero.
+        self.sum_of_particles(|i| [self.pe1(i), self.pe2(i)]).map(|sum| 0.0 + sum)
     }
 
     /// Strain of one particle's surroundings; `None` for a particle that sees too few.

@@ -98,7 +98,8 @@ fn row(step: &LoadStep, loads: &[Option<usize>], keys: &[&str]) -> Vec<Option<f6
     let done = mechanics.work_done.or((step.step == 0).then(Work::default));
     let [by_loads, by_supports] = [done.map(|work| work.loads), done.map(|work| work.supports)];
     numbers.extend([by_loads, by_supports, Some(mechanics.strain_energy), peak]);
-    numbers
+    // Without the sign of a zero.
+    numbers.into_iter().map(|number| number.map(|number| 0.0 + number)).collect()
 }
 
 /// Load over displacement: of the loads along their resultant, and of each region that is moved along the way that it

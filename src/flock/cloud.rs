@@ -30,7 +30,7 @@ const MARGIN: f64 = 1e-9;
 const SAMPLES: usize = 1000;
 
 impl Cloud {
-    /// `radius` is that of the neighbourhood \[length\]: no neighbour is looked for beyond it.
+    /// `radius` is that of the neighbourhood \[length\]: entries are those within it.
     ///
     /// # Errors
     /// A radius that holds too many.
@@ -46,14 +46,31 @@ impl Cloud {
             });
             least
         };
-        let mut apart: Vec<f64> = (0..points.len()).map(nearest).filter(|apart| apart.is_finite()).collect();
+        let mut apart: Vec<f64> = (0..points.len()).map(nearest).collect();
         if entries > MOST_ENTRIES {
             return Err(BodyError::TooManyNeighbours { radius, about: entries, limit: MOST_ENTRIES });
         }
+        let widest = points
+            .bounds(0..points.len())
+            .map_or(0.0, |(low, high)| f64::max(high[0] - low[0], high[1] - low[1]));
+        // The nearest of a point that sees none within the radius.
+        let beyond = |i: usize| {
+            let (mut radius, mut least) =
+                (f64::max(reach, widest / (points.len() as f64).sqrt()), f64::INFINITY);
+            while least.is_infinite() && radius < 4.0 * widest {
+                radius *= 2.0;
+                grid.each_within(&points, i, radius, |k| {
+                    least = least.min(distance(points.get(i), points.get(k as usize)));
+                });
+            }
+            least
+        };
+        let alone = apart.iter_mut().enumerate().filter(|(_, apart)| apart.is_infinite());
+        alone.for_each(|(i, apart)| *apart = beyond(i));
         let middle = apart.len() / 2;
-        // Where no point has a neighbour the radius is all that is known.
-        let spacing =
-            if apart.is_empty() { radius } else { *apart.select_nth_unstable_by(middle, f64::total_cmp).1 };
+        let spacing = *apart.select_nth_unstable_by(middle, f64::total_cmp).1;
+        // Of a single point the radius is all that is known.
+        let spacing = if spacing.is_finite() { spacing } else { radius };
         Ok(Self { points, ids, spacing, entries })
     }
 }
@@ -149,6 +166,18 @@ mod tests {
         let error = Body::of_cloud(&cloud, Some(0.15)).expect_err("alone");
         assert_eq!(error, BodyError::Alone { id: 28, place: [9.0, 9.0], radius: 0.15 });
         assert!(Body::of_cloud(&cloud, None).expect("found at every step").1.index.is_empty());
+    }
+
+    #[test]
+    fn the_spacing_is_that_of_all_points_also_of_those_that_see_none() {
+        let wide = (0..36).map(|i| [5.0 * f64::from(i / 6), 5.0 * f64::from(i % 6)]);
+        let points: Vectors = wide.chain([[0.5, 0.0]]).collect();
+        for radius in [1e-9, 1.0, 6.0] {
+            let cloud = Cloud::new(points.clone(), (1..=37).collect(), radius).expect("a cloud");
+            assert_eq!(cloud.spacing, 5.0, "{radius}");
+        }
+        let single = [[3.0, 4.0]].into_iter().collect();
+        assert_eq!(Cloud::new(single, vec![1], 0.3).expect("a cloud").spacing, 0.3);
     }
 
     #[test]

@@ -70,13 +70,16 @@ pub enum Interpolation {
 }
 
 impl Motion {
-    /// Whether it leads every particle along this axis, 0 or 1, at some time, as far as that is the same for all.
+    /// Whether it leads a particle along this axis, 0 or 1, at some time; of a table its rows say so.
     pub fn goes_along(&self, axis: usize) -> bool {
         match self {
             Self::Velocity { per_step } => per_step[axis] != 0.0,
             Self::Keyframes { frames, .. } => frames.iter().any(|frame| frame.displacement[axis] != 0.0),
             Self::Sinusoid { amplitude, .. } => amplitude[axis] != 0.0,
-            Self::Affine { .. } | Self::Table { .. } => false,
+            Self::Affine { angle, stretch, shear, .. } => {
+                *angle != 0.0 || stretch[axis] != 1.0 || shear[axis] != 0.0
+            }
+            Self::Table { .. } => false,
         }
     }
 

@@ -129,6 +129,11 @@ impl Scene {
         farthest_seeing(self.material.as_ref(), &self.inclusions)
     }
 
+    /// The factor by which feedback enlarges each update, as a damping above 1 would \[1\].
+    pub(crate) fn over_relaxation(&self) -> f64 {
+        self.feedback.map_or(1.0, |feedback| feedback.over_relaxation())
+    }
+
     /// Which turns of the body are no strain.
     pub fn rotation(&self) -> Rotation {
         self.mean.rotation()
@@ -218,7 +223,7 @@ pub enum Weights {
 /// The Poisson term (Eq. 2) before the body's width is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoissonTerm {
-    /// Response `K` \[1\]; negative draws the sides together when pulled.
+    /// Response `K` \[1\]; negative draws the sides together where particles move along the axis, else apart.
     pub k: f64,
     /// The axis whose displacement acts.
     pub axis: Axis,

@@ -57,6 +57,15 @@ impl DisplacementTable {
         Ok(if by_id { Self::ById(ids) } else { Self::ByPlace(places) })
     }
 
+    /// Whether a row goes along this axis, 0 or 1.
+    pub fn go_along(&self, axis: usize) -> bool {
+        let goes = |row: &Displaced| row.by[axis] != 0.0;
+        match self {
+            Self::ByPlace(rows) => rows.iter().any(|(_, row)| goes(row)),
+            Self::ById(rows) => rows.iter().any(|(_, row)| goes(row)),
+        }
+    }
+
     /// Displacement of each of `particles` (indices), in their order.
     ///
     /// # Errors

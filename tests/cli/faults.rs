@@ -229,12 +229,24 @@ fn a_radius_beyond_everything_is_refused_at_once() {
 }
 
 #[test]
+fn a_body_that_nothing_holds_is_refused_with_the_remedy() {
+    let sets = ["roles=[]", "equilibrium={}", "record={}"];
+    let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", *set]).collect();
+    let words = ["connected to no held particle", "help: clamp or lead particles of each part of the body"];
+    refused(&[&["run", "tension"][..], &sets].concat(), &words);
+}
+
+#[test]
 fn shapes_that_no_lattice_follows_are_refused_by_name_and_place() {
     let plate = "shape = { kind = \"rectangle\", max = [20.0, 10.0] }";
     let disc = |centre: [f64; 2], radius: f64| {
         format!("{{ kind = \"disc\", centre = {centre:?}, radius = {radius:?} }}")
     };
     let holes = |discs: &[String]| format!("body={{ {plate}, holes = [{}] }}", discs.join(", "));
+    let lattice = |second: &str| {
+        let first = disc([14.0, 5.0], 2.0);
+        format!("body={{ {plate}, outline = \"lattice\", holes = [{first}, {second}] }}")
+    };
     let polygon =
         |vertices: &str| format!("body={{ shape = {{ kind = \"polygon\", vertices = [{vertices}] }} }}");
     let cases = [
@@ -261,6 +273,10 @@ fn shapes_that_no_lattice_follows_are_refused_by_name_and_place() {
             "body.holes[1]",
             "hole 2 is 0.600000 across",
         ),
+        // Holes that a body of whole cells would leave out: between sites, and outside.
+        (lattice(&disc([4.5, 4.9], 0.5)), "body.holes[1]", "takes no particle out of the body"),
+        (lattice(&disc([40.0, 4.5], 2.0)), "body.holes[1]", "takes no particle out of the body"),
+        (lattice(&disc([1e12, 4.5], 2.0)), "body.holes[1]", "takes no particle out of the body"),
     ];
     for (body, key, words) in cases {
         let sets = ["--set", &body, "--set", "lattice.spacing=1.0", "--set", "record.places=[]"];

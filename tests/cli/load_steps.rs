@@ -189,6 +189,7 @@ fn a_load_follows_the_steps_of_a_sweep_and_leaders_are_measured_on_their_way() {
     let steps = "[stop]\nsteps = 400\n[load_steps]\nramp = { steps = 200 }\nevery = 50\n";
     let (folder, _) = run(&[BAR, PULL, steps], &["--figures", "none"], 0);
     let rows = table(folder.path().join("o/load.csv"));
+    assert!(rows.values().flatten().all(|&value| value != 0.0 || value.is_sign_positive()), "{rows:?}");
     assert_eq!(rows["step"], [0.0, 50.0, 100.0, 150.0, 200.0, 250.0, 300.0, 350.0, 400.0]);
     assert_eq!(rows["factor"], [0.0, 0.25, 0.5, 0.75, 1.0, 1.0, 1.0, 1.0, 1.0]);
     assert!(near(rows["load.fx"][2], 50.0, 100.0) && near(rows["load.fx"][8], 100.0, 100.0), "{rows:?}");

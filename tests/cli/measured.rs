@@ -334,7 +334,19 @@ fn a_motion_that_goes_where_nothing_is_led_is_refused() {
             "[[roles]]\nregion = {{ kind = \"edge\", side = \"right\" }}\nrole = \"leader\"\naxis = \"x\"\nmotion = {{ {motion} }}\n[stop]\nsteps = 2\n"
         )
     };
+    let led_by_table = temporary();
+    let table = led_by_table.path().join("led.csv");
+    let rows =
+        |uy: f64| (0..=4).map(|i| format!("4.0,{},0.1,{uy}\n", 0.5 * f64::from(i))).collect::<String>();
+    let of_table = |uy: f64| {
+        std::fs::write(&table, format!("x,y,ux,uy\n{}", rows(uy))).expect("written");
+        format!("kind = \"csv\", file = '{}'", table.display())
+    };
     for motion in [
+        &of_table(0.3),
+        "kind = \"affine\", rotate = 5.0, steps = 2",
+        "kind = \"affine\", stretch = [1.0, 1.1], steps = 2",
+        "kind = \"affine\", shear = [0.0, 0.1], steps = 2",
         "kind = \"velocity\", per_step = [0.01, 0.5]",
         "kind = \"sinusoid\", amplitude = [0.0, 0.1], period = 8",
         "kind = \"keyframes\", frames = [{ step = 1, displacement = [0.1, 0.0] }, { step = 2, displacement = [0.1, 0.1] }]",
@@ -345,7 +357,13 @@ fn a_motion_that_goes_where_nothing_is_led_is_refused() {
             "{said}"
         );
     }
-    run(&[BAR, &led("kind = \"velocity\", per_step = [0.01, 0.0]")], &["--figures", "none"], 0);
+    for motion in [
+        &of_table(0.0),
+        "kind = \"affine\", stretch = [1.01, 1.0], shear = [0.01, 0.0], steps = 2",
+        "kind = \"velocity\", per_step = [0.01, 0.0]",
+    ] {
+        run(&[BAR, &led(motion)], &["--figures", "none"], 0);
+    }
 }
 
 #[test]

@@ -464,6 +464,12 @@ fn a_plan_says_what_is_modelled_left_out_and_why() {
         "because of actions[0]",
     ];
     assert!(words.iter().all(|words| said.contains(words)) && !said.contains("not overshot"), "{said}");
+    let within = later.replace(
+        "'rule.feedback.factor=-0.1'",
+        "'rule={mean={kind=\"barycentre\"},poisson={axis=\"x\",k=0.1}}'",
+    );
+    let said = done(&["plan", "tension", "--set", &within], folder.path());
+    assert!(said.contains("rule.poisson from step 21 on") && said.contains("  rule.feedback "), "{said}");
 }
 
 #[test]
@@ -491,6 +497,25 @@ fn what_comes_after_the_last_step_is_warned_of_by_the_plan_and_the_run() {
         said.contains("beyond the last increment, 4, and without effect: record.figures[1] = 5;"),
         "{said}"
     );
+}
+
+#[test]
+fn keys_of_steps_that_an_equilibrium_does_not_take_are_warned_of_by_the_plan_and_the_run() {
+    let folder = temporary();
+    let set = [
+        "update={ order = \"sequential\", damping = 0.3 }",
+        "stop={ steps = 7, tolerance = 1e-3 }",
+        "record={ figures = [3, 7], vtk_every = 5 }",
+    ];
+    let set: Vec<&str> = set.iter().flat_map(|text| ["--set", *text]).collect();
+    let words = "caution: without effect on an equilibrium that is solved for: update.order, update.damping, stop.tolerance, \
+                 record.figures[0] = 3; leave [equilibrium] out to step\n";
+    for command in [&["plan", "bar"][..], &["run", "bar", "--no-report", "--figures", "none", "--out", "o"]] {
+        let said = done(&[command, &set].concat(), folder.path());
+        assert!(said.contains(words), "{said}");
+        assert!(command[0] == "run" || said.contains("a ParaView file of the equilibrium"), "{said}");
+    }
+    assert!(!done(&["plan", "bar"], folder.path()).contains("without effect"));
 }
 
 #[test]

@@ -1,10 +1,11 @@
 //! Scenes whose body cannot be laid out, by the key at fault.
 
-use crate::flock::body::{Body, BodyError};
+use crate::flock::body::{Body, BodyError, Cut};
 use crate::flock::lattice::Site;
 use crate::flock::neighbourhood::{Neighbourhood, NeighbourhoodError};
 use crate::flock::vectors::{Vectors, distance};
 use crate::geometry::outline::OutlineError;
+use crate::geometry::shape::Shape;
 use crate::material::cells::{neighbourhood, neighbourhood_of};
 use crate::material::fit::{FitError, Part};
 use crate::scene::{BodySource, Scene, SceneError};
@@ -52,6 +53,36 @@ pub(super) fn require_resolved(scene: &Scene, body: &Body) -> Result<(), SceneEr
         );
         let key = if scene.raw.body.anchor.is_some() { "body.anchor" } else { "body.shape" };
         return Err(scene.refuse(key, message, "put the origin of the coordinates near the body"));
+    }
+    Ok(())
+}
+
+/// Refuses a hole that takes no site out of a body on a lattice: it would make no difference.
+pub(super) fn require_holes(scene: &Scene) -> Result<(), SceneError> {
+    let BodySource::Cut(Cut::Shape(Shape::WithHoles { body, holes })) = &scene.body else { return Ok(()) };
+    let (lattice, tolerance) = (&scene.lattice, 1e-9 * scene.lattice.spacing());
+    let (low, high) = body.bounds();
+    for (k, hole) in holes.iter().enumerate() {
+        let (from, to) = hole.bounds();
+        let (from, to) =
+            ([0, 1].map(|k| f64::max(low[k], from[k])), [0, 1].map(|k| f64::min(high[k], to[k])));
+        let is_out = |site| {
+            let place = lattice.position(site);
+            lattice.is_site(site) && hole.contains(place, -tolerance) && body.contains(place, tolerance)
+        };
+        // Within the body's bounds the grid is within range.
+        let takes_some = || {
+            let (first, last) = lattice.grid_bounds((from, to));
+            let [columns, mut rows] = [0, 1].map(|k| first[k].floor() as i32 - 1..=last[k].ceil() as i32 + 1);
+            rows.any(|row| columns.clone().any(|column| is_out([column, row])))
+        };
+        let overlaps = (0..2).all(|k| from[k] <= to[k]);
+        if !(overlaps && takes_some()) {
+            let message =
+                "takes no particle out of the body: no site of the lattice lies both in it and in the shape";
+            let help = "use a smaller lattice.spacing, move it, or leave it out";
+            return Err(scene.refuse(&format!("body.holes[{k}]"), message, help));
+        }
     }
     Ok(())
 }

@@ -30,6 +30,11 @@ impl Feedback {
         self.reference == FeedbackReference::Initial && self.factor != 0.0
     }
 
+    /// The factor by which it enlarges each update, as a damping above 1 would \[1\].
+    pub fn over_relaxation(&self) -> f64 {
+        if self.reference == FeedbackReference::Previous { 1.0 + self.factor } else { 1.0 }
+    }
+
     /// Moves the target past itself.
     pub fn overshoot(&self, own: &ParticleState, target: &mut [f64; 2]) {
         let from = match self.reference {

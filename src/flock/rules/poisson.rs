@@ -20,7 +20,7 @@ pub enum Axis {
 /// Eq. 2 with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Poisson {
-    /// `K` \[1\]: response per unit of displacement along `axis`; negative draws the sides together.
+    /// `K` \[1\]: response per unit of displacement along `axis`; negative draws the sides together where that is positive.
     pub k: f64,
     /// The axis whose displacement acts (the paper's x).
     pub axis: Axis,

@@ -17,7 +17,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue, Error};
 
 use overrides::Segment;
-pub(crate) use overrides::find;
+pub(crate) use overrides::{find, split_assignment};
 use problem::{Place, Problem, SceneError};
 
 /// Tables and lists may nest this deep, so that recursion over a document cannot exhaust the stack.

@@ -126,7 +126,8 @@ pub enum RawGhosts {
     /// A point at the original lattice offset: fragments recover the lattice's shape.
     #[default]
     Lattice,
-    /// The mirror image of the opposite neighbour.
+    /// The mirror image of the opposite neighbour; where none lies opposite (nearest neighbours on a honeycomb, points) as
+    /// `lattice`.
     Mirrored,
     /// Nothing: the mean runs over those left, and so does the correction of `rule.rest = "balanced"`.
     None,

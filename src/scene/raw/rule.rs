@@ -192,7 +192,8 @@ pub enum RawAxis {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawPoisson {
-    /// Response `K`; negative draws the sides together when pulled [1].
+    /// Response `K`; negative draws the sides together where particles move along the axis, and apart where they move
+    /// against it [1].
     pub k: f64,
     /// The axis whose displacement acts.
     #[serde(default)]

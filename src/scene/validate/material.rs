@@ -112,21 +112,23 @@ pub fn is_material(raw: &RawScene) -> bool {
     matches!(raw.rule.mean, Some(RawMean::Material { .. }))
 }
 
-/// The damping as written; unless it is, 1, or what keeps every wave of a material or a second gradient from growing.
+/// The damping as written; unless it is, 1, or what keeps every wave of a material or a second gradient from growing, also
+/// where feedback over-relaxes.
 pub fn damping(raw: &RawScene, lattice: &Lattice, body: Option<&Elastic>, inclusions: &[Inclusion]) -> f64 {
     let synchronous = raw.update.order == RawOrder::Synchronous;
     let limit = |elastic: &Elastic| {
         Crystal::material(lattice, elastic).ok()?.zone().ok().map(|zone| zone.damping_limit)
     };
+    let over = raw.rule.feedback.as_ref().map_or(1.0, |raw| super::feedback(raw).over_relaxation().max(1.0));
     let of_waves = || {
         if synchronous && matches!(raw.rule.weights, Some(RawWeights::Gradient { .. })) {
-            return OF_DAMPING_LIMIT * SAFE_DAMPING;
+            return OF_DAMPING_LIMIT * SAFE_DAMPING / over;
         }
         let body = body.filter(|_| is_material(raw) && synchronous);
         let all = body.into_iter().flat_map(|body| {
             std::iter::once(body).chain(inclusions.iter().map(|part| &part.material)).filter_map(limit)
         });
-        all.fold(1.0, |least: f64, limit| least.min(OF_DAMPING_LIMIT * limit))
+        all.fold(1.0, |least: f64, limit| least.min(OF_DAMPING_LIMIT * limit / over))
     };
     raw.update.damping.unwrap_or_else(of_waves)
 }

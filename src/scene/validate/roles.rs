@@ -38,9 +38,12 @@ pub fn role_entry(
     let motion = raw.motion.as_ref().map(|motion| leader_motion(key, motion, folder, refuse)).transpose()?;
     let axis = raw.axis.map(Axis::from);
     let (led, other, across) = if axis == Some(Axis::Y) { ("y", "x", 0) } else { ("x", "y", 1) };
-    if let (Some(_), Some(LeaderMotion::Program(motion))) = (axis, &motion)
-        && motion.goes_along(across)
-    {
+    let goes_across = match &motion {
+        Some(LeaderMotion::Program(motion)) => motion.goes_along(across),
+        Some(LeaderMotion::Table { rows, .. }) => rows.go_along(across),
+        Some(LeaderMotion::Reference { .. }) | None => false,
+    };
+    if axis.is_some() && goes_across {
         let message =
             format!("axis = \"{led}\" leads along {led} alone, and the motion goes along {other} too");
         let help = "make the other component of the motion zero, or leave `axis` out";

@@ -267,7 +267,9 @@ impl Study {
 
     /// The quickest setting whose error is at most `error` \[1\].
     pub fn cheapest(&self, error: f64) -> Option<&Point> {
-        self.front().into_iter().find(|point| point.error.is_some_and(|e| e <= error))
+        let near = self.settled().filter(|point| point.error.is_some_and(|e| e <= error));
+        let timed = near.filter_map(|point| Some((point.seconds?, point)));
+        timed.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, point)| point)
     }
 
     fn settled(&self) -> impl Iterator<Item = &Point> {
@@ -347,7 +349,7 @@ mod tests {
     fn the_front_is_what_nothing_beats_in_both() {
         let mut points = vec![point(3.0, 0.1), point(1.0, 0.5), point(2.0, 0.6), point(4.0, 0.1)];
         points.push(Point { outcome: Outcome::Unsettled, ..point(0.1, 0.001) });
-        let study = Study {
+        let mut study = Study {
             name: String::new(),
             title: String::new(),
             truth_nodes: 1,
@@ -360,5 +362,9 @@ mod tests {
         assert_eq!(times, [1.0, 3.0]);
         assert_eq!(study.cheapest(0.2).and_then(|p| p.seconds), Some(3.0));
         assert_eq!(study.cheapest(0.01), None);
+        // Too little nearer than the quicker one to be of the front, and the one that is near enough.
+        study.points.extend([point(5.0, 0.05), point(6.0, 0.0499)]);
+        assert_eq!(study.front().last().and_then(|p| p.seconds), Some(5.0));
+        assert_eq!(study.cheapest(0.0499).and_then(|p| p.seconds), Some(6.0));
     }
 }
