@@ -9,7 +9,7 @@ use super::ways::Ways;
 use crate::flock::grid::CellGrid;
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::vectors::{Vectors, distance};
-use crate::geometry::point::minus;
+use crate::geometry::point::{minus, plus};
 
 /// The reasons for changing a target, and other events of a tick, as bits that may be combined; those of the message `flockform_msgs/MemberState`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -84,7 +84,7 @@ pub struct Filter {
     pub(super) obstacles: Obstacles,
     pub(super) fence: Obstacles,
     pub(super) detours: Vec<Detour>,
-    /// Targets of the last tick, and the places from which members were sent there \[m\]; not finite before there were any.
+    /// Targets of the last tick, and where members were a period before they are to be there \[m\]; not finite before there were any.
     pub(super) sent: Vectors,
     pub(super) sent_before: Vectors,
     pub(super) crowd: Crowd,
@@ -250,9 +250,19 @@ impl Filter {
         safe.clone_from(seen.present);
         for (member, flags) in flags.iter_mut().enumerate() {
             let ([from, target], changed) = self.target(seen, wanted.get(member), period, member);
-            // One that is sent nowhere may be anywhere when it is heard again.
-            let sent = if seen.known[member] { target } else { [f64::NAN; 2] };
-            self.sent_before.set(member, from);
+            let last = self.sent.get(member);
+            // One that brakes and is sent nowhere may be anywhere when it is heard again; others stand where they were sent.
+            let [before, sent] = match (seen.known[member], self.crowd.brakes) {
+                (true, _) => {
+                    // From a late pose it is sent on for as long as that is old, too.
+                    let share =
+                        if from == last { 1.0 } else { period / (period + seen.ages[member].max(0.0)) };
+                    [plus(target, minus(from, target).map(|d| share * d)), target]
+                }
+                (false, true) => [[f64::NAN; 2]; 2],
+                (false, false) => [last; 2],
+            };
+            self.sent_before.set(member, before);
             self.sent.set(member, sent);
             safe.set(member, target);
             *flags = changed;

@@ -106,7 +106,10 @@ impl Filter {
             let is_there = is_near || seen.ages[member] > (1.0 - TOUCHING) * period || margin > 0.0;
             return if is_there { (last, most) } else { from_pose };
         }
-        if !is_near || (ahead == 0.0 && margin == 0.0) {
+        // Two late poses give no velocity.
+        let is_inexact =
+            ahead > 0.0 || (self.velocity(seen, member).is_some() && self.is_inexact(seen, period, member));
+        if !is_near || !(is_inexact || margin > 0.0) {
             return from_pose;
         }
         let room = self.longest_step(period, ahead) + 2.0 * margin - distance(last, pose);
