@@ -30,6 +30,7 @@ pub mod pseudo_energy;
 pub mod real;
 pub mod region;
 pub mod role;
+pub mod rounding;
 pub mod rules;
 pub(crate) mod splitmix;
 pub mod strain;

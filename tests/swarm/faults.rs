@@ -74,6 +74,21 @@ fn a_silent_member_is_held_then_dropped_then_stopped_and_the_others_come_home() 
     assert!(worst < 0.01, "{worst}");
 }
 
+/// The third period of 0.3 s begins at 0.8999999999999999 s.
+#[test]
+fn a_fault_holds_from_the_period_that_begins_with_it_to_the_one_that_begins_with_its_end() {
+    let fault =
+        "flight.faults=[{ robot = \"robot_13\", at = 0.9, until = 1.2, what = { kind = \"silent\" } }]";
+    let mut flight = Flight::new(&load_swarm("square", &["control.period=0.3", fault])).expect("flies");
+    let mut faulty = Vec::new();
+    for period in 0..6 {
+        faulty.extend((!flight.fleet().is_sound(MIDDLE)).then_some(period));
+        flight.step();
+    }
+    assert_eq!(faulty, [3]);
+    assert_eq!(flight.control().watch().counts(MIDDLE).accepted, 5);
+}
+
 #[test]
 fn a_member_that_comes_back_is_believed_again_and_the_formation_is_whole() {
     let fault =

@@ -229,6 +229,25 @@ fn what_is_doubtful_is_a_caution_before_the_flight() {
     assert!(bounded.contains("no leader reaches `c`, `d`"), "{bounded}");
 }
 
+/// In binary 3 x 0.1 is above 0.3, and 1.5 x 6 / 15 above 0.6.
+#[test]
+fn what_is_exactly_at_a_limit_is_no_reason_for_caution_or_refusal() {
+    let cautions = |more: &[&str]| plan_of(&load_swarm("square", more));
+    let late = ["control.period=0.1", "poses={ age_limit = 0.3 }", "flight.delay=3"];
+    let led = "manoeuvres=[{ name = \"turn\", legs = [{ seconds = 15.0, translate = [6.0, 0.0] }] }]";
+    let fault = "flight.faults=[{ robot = \"robot_1\", at = 0.9, until = 1.2, what = { kind = \"stuck\" } }]";
+    for more in [&late[..], &[led, "limits.speed=0.6"], &["control.period=0.3", fault]] {
+        assert_eq!(cautions(more), [""; 0], "{more:?}");
+    }
+    // 1.4 - 0.7 is less than 0.2 + 0.2 + 0.3.
+    let dense = "title = \"t\"\nradius = 0.2\nlattice = { kind = \"square\", spacing = 0.7 }\n\
+                 body = { shape = { kind = \"grid\", columns = 10, rows = 3 } }\nlimits = { clearance = 0.3 }\n\
+                 leaders = [{ region = { kind = \"ids\", ids = [1, 10, 21, 30] }, program = { kind = \"external\" } }]\n\
+                 neighbours = { kind = \"second\" }\n";
+    assert!(Flight::new(&parse(dense).expect("valid")).is_ok());
+    assert!(refusal(&dense.replace("0.3", "0.301")).contains("need 0.701 m"));
+}
+
 /// One file may have the ways of all robots: those of an entry's own count.
 #[test]
 fn rows_for_robots_of_other_entries_are_no_reason_for_caution() {

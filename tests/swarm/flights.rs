@@ -358,6 +358,21 @@ fn unicycles_move_however_little_they_go_in_a_period() {
     }
 }
 
+/// What is declared as it was reported would else be broken by its last digit.
+#[test]
+fn rounding_breaks_no_bound() {
+    let bounds = |settling: f64| {
+        let declared = format!("flight.bounds={{ settled_within = 0.001, settling_time = {settling:?} }}");
+        let led = "manoeuvres=[{ name = \"turn\", legs = [{ seconds = 2.0, translate = [1.0, 0.5] }] }]";
+        let more = [declared.as_str(), led, "control.sweeps=1", "flight.duration=6.0"];
+        flown(&load_swarm("square", &more)).1.bounds
+    };
+    let found = bounds(9.0)[0].found.expect("it settles");
+    assert!(found > 0.0, "{found}");
+    assert!(bounds(found * (1.0 - 1e-12))[0].holds);
+    assert!(!bounds(found * (1.0 - 1e-6))[0].holds);
+}
+
 #[test]
 fn a_broken_bound_names_the_robots_the_time_and_the_place() {
     let swarm = parse(HEAD_ON).expect("valid");

@@ -18,6 +18,7 @@ use super::safety::{self, Filter, Flags, Limits, SafetyError, Stray};
 use super::transport::Received;
 use super::watch::{Gains, Health, Pose, Range, Rejection, Track, Watch};
 use crate::flock::manoeuvre::Manoeuvre;
+use crate::flock::rounding::at_most;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
@@ -315,7 +316,7 @@ impl Control {
     /// Whether a pose at a place \[m\] would be believed.
     pub(crate) fn is_believed(&self, place: [f64; 2]) -> bool {
         let watch = self.watch.limits();
-        distance(place, watch.centre) <= watch.range
+        at_most(distance(place, watch.centre), watch.range)
     }
 
     /// Moves all leaders by a manoeuvre from the next tick on.

@@ -4,6 +4,7 @@ use super::Flight;
 use super::measure::{Record, farthest};
 use super::moment::Extreme;
 use super::report::rounding_of;
+use crate::flock::rounding::at_most;
 use crate::flock::vectors::Vectors;
 use crate::scene::swarm::Swarm;
 use crate::swarm::control::Control;
@@ -62,7 +63,7 @@ fn broken(
     let above = |bound, declared: Option<f64>, by: Option<Extreme>| {
         let (declared, found) = (declared?, by?.value);
         let robots = by.iter().map(|by| by.member).collect();
-        (found > declared).then_some(Alarm { bound, declared, found, robots })
+        (!at_most(found, declared)).then_some(Alarm { bound, declared, found, robots })
     };
     let rounding = rounding_of(formation);
     let too_close = bounds.clearance.filter(|&declared| clearance < declared - rounding).map(|declared| {

@@ -1,13 +1,11 @@
 //! The places at which robots start: clear of obstacles and of each other.
 
 use super::Flight;
+use crate::flock::rounding::ROUNDING;
 use crate::flock::vectors::distance;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 use crate::scene::text::decimals;
-
-/// An overlap below this is rounding \[m\].
-const ROUNDING: f64 = 1e-9;
 
 /// Refuses robots that start inside an obstacle or, where robots are kept apart, inside another robot.
 ///

@@ -1,5 +1,6 @@
 //! Faults of robots, each with its member and time span.
 
+use crate::flock::rounding::at_most;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::RawFaultKind;
@@ -30,7 +31,7 @@ impl Fault {
     }
 
     pub fn has_begun(&self, now: f64) -> bool {
-        self.from <= now
+        at_most(self.from, now)
     }
 
     /// Its kind.
@@ -48,7 +49,7 @@ impl Fault {
     }
 
     pub fn holds(&self, now: f64) -> bool {
-        (self.from..self.until).contains(&now)
+        lasts([self.from, self.until], now)
     }
 
     /// Whether the robot stands still.
@@ -70,6 +71,11 @@ impl Fault {
             RawFaultKind::NotANumber => Sender::Lying(Lie::NotANumber),
         }
     }
+}
+
+/// Whether a time is in a span, the end of which is not.
+pub fn lasts([from, until]: [f64; 2], now: f64) -> bool {
+    at_most(from, now) && !at_most(until, now)
 }
 
 /// The faults of a swarm, in the order of the file.

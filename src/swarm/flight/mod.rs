@@ -22,12 +22,14 @@ use super::robots::Robot;
 use super::transport::Received;
 use crate::continuum::plan::Plan;
 use crate::engine::Engine;
+use crate::flock::rounding::at_most;
 use crate::flock::vectors::distance;
 use crate::scene::SceneError;
 use crate::scene::swarm::{Shape, Swarm};
 pub use acceleration::AccelerationReport;
 pub use alarms::Alarm;
 pub use commands::FlightCommand;
+pub(super) use faults::lasts;
 pub use fleet::Fleet;
 pub use measure::{Record, Sample};
 pub use moment::Moment;
@@ -124,7 +126,7 @@ impl Flight {
         let watch = self.control.watch();
         let counts = watch.counts(member);
         let has_sent = counts.accepted + counts.rejected() > 0;
-        let is_late = self.fleet.time() <= self.fleet.longest_delay() + watch.limits().age_limit;
+        let is_late = at_most(self.fleet.time(), self.fleet.longest_delay() + watch.limits().age_limit);
         !self.control.health(member).is_usable() && (has_sent || !is_late)
     }
 

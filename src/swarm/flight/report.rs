@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::moment::Extreme;
 use super::{AccelerationReport, Flight, Moment, Record, Sample};
 use crate::flock::role::Role;
+use crate::flock::rounding::{ROUNDING, at_most};
 use crate::scene::swarm::Swarm;
 use crate::swarm::formation::{Formation, first_few};
 
@@ -267,7 +268,7 @@ fn largest_and_end(samples: &[Sample], of: impl Fn(&Sample) -> Option<f64>) -> O
 /// From the end of the programs to the first time after which the shape holds for good.
 fn settling_time(samples: &[Sample], programs_end: f64, within: f64) -> Option<f64> {
     let error = |s: &Sample| s.affine_error.or(s.formation_error);
-    let last_off = samples.iter().rposition(|s| error(s).is_none_or(|error| error > within));
+    let last_off = samples.iter().rposition(|s| error(s).is_none_or(|error| !at_most(error, within)));
     let settled = last_off.map_or(0, |k| k + 1);
     samples.get(settled).map(|sample| (sample.time - programs_end).max(0.0))
 }
@@ -277,7 +278,7 @@ fn settling_time(samples: &[Sample], programs_end: f64, within: f64) -> Option<f
 pub(super) fn rounding_of(formation: &Formation) -> f64 {
     let places = &formation.places;
     let far = places.x.iter().chain(&places.y).fold(0.0, |far: f64, at| far.max(at.abs()));
-    (8.0 * f64::EPSILON * far).max(1e-9)
+    (8.0 * f64::EPSILON * far).max(ROUNDING)
 }
 
 fn verdicts(
@@ -290,12 +291,12 @@ fn verdicts(
     let bounds = &swarm.raw.flight.bounds;
     let (names, rounding) = (&formation.names, rounding_of(formation));
     let named = |extreme: Option<Extreme>| extreme.map(|extreme| extreme.named(names));
-    let at_most = |bound, declared: Option<f64>, found: Option<f64>, worst: Option<Extreme>| {
+    let kept = |bound, declared: Option<f64>, found: Option<f64>, worst: Option<Extreme>| {
         declared.map(|declared| Verdict {
             bound,
             declared,
             found,
-            holds: found.is_some_and(|found| found <= declared),
+            holds: found.is_some_and(|found| at_most(found, declared)),
             worst: named(worst),
         })
     };
@@ -311,18 +312,14 @@ fn verdicts(
     let mut by_shape = record.farthest.iter().map(|all| all[affine].or(all[rest]));
     let at_end = by_shape.clone().next_back().flatten();
     // The robot that kept the formation from being settled.
-    let unsettled = by_shape.rfind(|one| one.is_some_and(|one| one.value > bounds.settled_within)).flatten();
+    let unsettled =
+        by_shape.rfind(|one| one.is_some_and(|one| !at_most(one.value, bounds.settled_within))).flatten();
     let [unsettled, at_end] = [unsettled, at_end].map(|one| one.filter(|_| report.programs_ended));
     let all = [
-        at_most(
-            "affine_error",
-            bounds.affine_error,
-            report.affine_error.map(|(most, _)| most),
-            largest(affine),
-        ),
-        at_most("final_error", bounds.final_error, last, at_end),
-        at_most("settling_time", bounds.settling_time, report.settling_time, unsettled),
-        at_most("continuum_error", bounds.continuum_error, report.continuum_error, largest(continuum)),
+        kept("affine_error", bounds.affine_error, report.affine_error.map(|(most, _)| most), largest(affine)),
+        kept("final_error", bounds.final_error, last, at_end),
+        kept("settling_time", bounds.settling_time, report.settling_time, unsettled),
+        kept("continuum_error", bounds.continuum_error, report.continuum_error, largest(continuum)),
         bounds.clearance.map(|declared| Verdict {
             bound: "clearance",
             declared,

@@ -1,6 +1,7 @@
 //! Checks of a formation that has been laid out.
 
 use super::Formation;
+use crate::flock::rounding::at_most;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
@@ -76,7 +77,7 @@ pub fn require_apart(swarm: &Swarm, formation: &Formation) -> Result<(), SceneEr
         for j in 0..i {
             let needed = formation.radii[i] + formation.radii[j] + clearance;
             let apart = distance(formation.places.get(i), formation.places.get(j));
-            if apart < needed {
+            if !at_most(needed, apart) {
                 let [apart, needed] = [apart, needed].map(rounded);
                 let message = format!(
                     "the places of `{}` and `{}` are {apart} m apart, and their radii and the clearance need {needed} m",
@@ -101,7 +102,7 @@ pub fn require_in_range(swarm: &Swarm, formation: &Formation) -> Result<(), Scen
     let (middle, range) = (formation.middle(), swarm.raw.poses.range);
     let off = |m: usize| distance(formation.places.get(m), middle);
     let farthest = (0..formation.count()).max_by(|&a, &b| off(a).total_cmp(&off(b)));
-    match farthest.filter(|&m| off(m) > range) {
+    match farthest.filter(|&m| !at_most(off(m), range)) {
         None => Ok(()),
         Some(m) => {
             let key = match swarm.raw.robots.len() {

@@ -4,12 +4,10 @@ use serde::Serialize;
 
 use super::not_linear;
 use crate::flock::manoeuvre::{Affine, Posture};
+use crate::flock::rounding::ROUNDING;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::swarm::Swarm;
 use crate::swarm::formation::Formation;
-
-/// Distance over the spacing of the formation that is rounding.
-const ROUNDING: f64 = 1e-9;
 
 /// How far followers come to rest from their places behind leaders that move as one.
 #[derive(Clone, Debug, PartialEq, Serialize)]

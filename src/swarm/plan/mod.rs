@@ -21,6 +21,7 @@ mod words;
 use serde::Serialize;
 
 use super::formation::Formation;
+use crate::flock::rounding::ROUNDING;
 use crate::flock::vectors::distance;
 use crate::scene::SceneError;
 use crate::scene::swarm::{Shape, Swarm};
@@ -175,7 +176,7 @@ impl SwarmPlan {
                 simulated_s: delay * period,
                 largest_s: raw.poses.age_limit,
                 // Of an exact multiple all periods count, whatever rounding makes of it.
-                largest_periods: (raw.poses.age_limit / period * (1.0 + 1e-12)) as usize,
+                largest_periods: (raw.poses.age_limit / period * (1.0 + ROUNDING)) as usize,
                 room_s: room_for_delay(formation, flight.control().limits()),
                 half_life_s: convergence.and_then(|one| Some(one.half_life_s? * (delay + 1.0))),
             },

@@ -1,6 +1,7 @@
 //! The conditions that a pose has to meet, and the meaning of its age.
 
 use super::{Health, Pose, RangeLimits, Rejection};
+use crate::flock::rounding::at_most;
 use crate::flock::vectors::distance;
 
 /// The conditions that poses have to meet. Needs `0 < fresh <= age_limit <= stop_after`.
@@ -68,14 +69,14 @@ impl WatchLimits {
             return Err(Rejection::WrongFrame);
         }
         let away = distance(pose.position, self.centre);
-        if away > self.range {
+        if !at_most(away, self.range) {
             return Err(Rejection::OutOfRange { distance: away, range: self.range });
         }
         let age = now - pose.stamp;
-        if -age > self.skew {
+        if !at_most(-age, self.skew) {
             return Err(Rejection::FromTheFuture { ahead: -age, skew: self.skew });
         }
-        if age > self.age_limit {
+        if !at_most(age, self.age_limit) {
             return Err(Rejection::TooOld { age, age_limit: self.age_limit });
         }
         Ok(())
@@ -90,9 +91,9 @@ impl WatchLimits {
     pub(super) fn health(&self, age: Option<f64>) -> Health {
         match age {
             None => Health::Waiting,
-            Some(age) if age <= self.fresh => Health::Fresh,
-            Some(age) if age <= self.age_limit => Health::Held,
-            Some(age) if age <= self.stop_after => Health::Degraded,
+            Some(age) if at_most(age, self.fresh) => Health::Fresh,
+            Some(age) if at_most(age, self.age_limit) => Health::Held,
+            Some(age) if at_most(age, self.stop_after) => Health::Degraded,
             Some(_) => Health::Stopped,
         }
     }

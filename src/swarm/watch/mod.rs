@@ -18,6 +18,8 @@ pub use rejection::{Counts, Rejection};
 pub(super) use track::MOST_SENT;
 pub use track::{Gains, Track};
 
+use crate::flock::rounding::at_most;
+
 /// A pose as it comes in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
@@ -244,7 +246,7 @@ impl Member {
     /// Adds a pose to the run of those not yet believed, or begins a new one with it; how many are in it.
     fn run_with(&mut self, pose: &Pose, now: f64, limits: &WatchLimits) -> Result<u32, Rejection> {
         let seen = match self.candidate {
-            Some((before, seen)) if now - before.stamp <= limits.age_limit => {
+            Some((before, seen)) if at_most(now - before.stamp, limits.age_limit) => {
                 if pose.stamp <= before.stamp {
                     return Err(Rejection::NotNewer { behind: before.stamp - pose.stamp });
                 }

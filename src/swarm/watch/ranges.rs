@@ -14,6 +14,7 @@
 
 use super::placing::{Places, Ring};
 use super::{Pose, Rejection, Watch, WatchLimits};
+use crate::flock::rounding::at_most;
 
 /// A distance that one member measured of another.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,7 +52,7 @@ const MOST_KEPT: usize = 16;
 impl Measured {
     /// Adds a range that is newer than all of them; those older than `age_limit` \[s\] go.
     fn add(&mut self, range: Range, from: Option<Pose>, age_limit: f64) {
-        self.kept.retain(|(known, _)| range.stamp - known.stamp <= age_limit);
+        self.kept.retain(|(known, _)| at_most(range.stamp - known.stamp, age_limit));
         // The newest is always kept, those before it as far apart as there is room for.
         if let [.., (before, _), (last, _)] = &self.kept[..]
             && last.stamp - before.stamp < age_limit / MOST_KEPT as f64
@@ -81,7 +82,7 @@ impl Watch {
         let Range { observer, of, distance, stamp } = range;
         assert!(observer < self.members.len(), "no member {observer}");
         let age = now - stamp;
-        let is_in_time = -self.limits.skew <= age && age <= self.limits.age_limit;
+        let is_in_time = at_most(-age, self.limits.skew) && at_most(age, self.limits.age_limit);
         if observer == of || !is_in_time || !distance.is_finite() || distance < 0.0 {
             return false;
         }
@@ -152,7 +153,7 @@ impl Watch {
         let ring = |one: &Measured| {
             let present = self.pose(one.observer)?;
             let (range, then) = one.at(stamp);
-            if (stamp - range.stamp).abs() > within {
+            if !at_most((stamp - range.stamp).abs(), within) {
                 return None;
             }
             // The pose known at the time, or the present one: the nearer in time.

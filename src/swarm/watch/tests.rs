@@ -49,6 +49,22 @@ fn a_pose_ages_from_fresh_to_stopped() {
 }
 
 #[test]
+fn a_pose_exactly_as_old_as_a_limit_is_within_it_whatever_rounding_makes_of_its_age() {
+    let limits = WatchLimits { fresh: 0.2, age_limit: 0.3, ..limits() };
+    for period in 0..100 {
+        let time = |period: i32| 0.1 * f64::from(period);
+        let mut watch = Watch::new(1, limits);
+        assert_eq!(watch.receive(0, pose(1.0, time(period)), time(period + 3)), Ok(()), "in {period}");
+        let mut watch = Watch::new(1, limits);
+        assert_eq!(watch.receive(0, pose(1.0, time(period)), time(period)), Ok(()));
+        for (later, health) in [(2, Health::Fresh), (3, Health::Held), (4, Health::Degraded)] {
+            watch.look(time(period + later));
+            assert_eq!(watch.health(0), health, "{later} after {period}");
+        }
+    }
+}
+
+#[test]
 fn each_kind_of_bad_pose_is_turned_away_for_its_reason() {
     let good = pose(1.0, 10.0);
     let at = |position| Pose { position, ..good };

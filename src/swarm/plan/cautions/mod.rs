@@ -7,21 +7,19 @@ use crate::continuum::late::beyond;
 use crate::flock::block::apply;
 use crate::flock::manoeuvre::Manoeuvre;
 use crate::flock::motion::{Interpolation, Keyframe, Motion};
+use crate::flock::rounding::{ROUNDING, at_most};
 use crate::flock::vectors::distance;
 use crate::geometry::point::minus;
 use crate::scene::swarm::raw::{RawCommandKind, RawSwarm};
 use crate::scene::swarm::{Program, Swarm};
 use crate::scene::text::{decimals, number};
-use crate::swarm::flight::Flight;
+use crate::swarm::flight::{Flight, lasts};
 use crate::swarm::formation::{Formation, first_few};
 use crate::swarm::safety::foot;
 pub use network::{late_without_speed, of_real_robots};
 
 /// Parts of a leg or of a program between which a leader's way is looked at.
 const PARTS: usize = 40;
-
-/// Less than this is rounding \[m\] or \[m/s\].
-const ROUNDING: f64 = 1e-9;
 
 /// All of them.
 pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
@@ -60,7 +58,7 @@ pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
 /// Faults that begin when the flight is over. What is done at its very end is how a session that was saved there ended.
 fn late_faults(flight: &Flight, raw: &RawSwarm) -> Option<String> {
     let end = flight.periods() as f64 * raw.control.period;
-    let late = raw.flight.faults.iter().enumerate().filter(|(_, fault)| fault.at > end);
+    let late = raw.flight.faults.iter().enumerate().filter(|(_, fault)| !at_most(fault.at, end));
     let keys = late.map(|(k, fault)| format!("flight.faults[{k}].at = {}", fault.at));
     beyond(&format!("the end of the flight, at {end} s"), keys, "flight.duration")
 }
@@ -70,7 +68,7 @@ fn short_faults(raw: &RawSwarm) -> Option<String> {
     let period = raw.control.period;
     let is_between = |at: f64, until: f64| {
         let first = (at / period).floor();
-        !(0..=2).any(|k| (at..until).contains(&((first + f64::from(k)) * period)))
+        !(0..=2).any(|k| lasts([at, until], (first + f64::from(k)) * period))
     };
     let short = raw.flight.faults.iter().enumerate();
     let short = short.filter(|(_, fault)| fault.until.is_some_and(|until| is_between(fault.at, until)));
@@ -221,7 +219,7 @@ fn commanded_astray<'a>(raw: &'a RawSwarm, flight: &'a Flight) -> impl Iterator<
 fn fast_manoeuvres(raw: &RawSwarm, formation: &Formation) -> impl Iterator<Item = String> {
     let limit = raw.limits.speed.unwrap_or(f64::INFINITY);
     let all = raw.manoeuvres.iter().filter_map(|one| needed(formation, &one.name));
-    let fast = all.filter(move |one| one.needed > limit);
+    let fast = all.filter(move |one| !at_most(one.needed, limit));
     fast.map(|ManoeuvreSpeed { name, needed }| {
         format!(
             "manoeuvre `{name}` moves a robot's place at up to {} m/s, above limits.speed: robots will fall \
@@ -235,7 +233,7 @@ fn fast_paths(swarm: &Swarm, formation: &Formation) -> impl Iterator<Item = Stri
     let limit = swarm.raw.limits.speed.unwrap_or(f64::INFINITY);
     (0..swarm.leaders.len()).filter_map(move |k| {
         let fastest = motions(swarm, formation, k).map(speed).fold(0.0, f64::max);
-        (fastest > limit * (1.0 + ROUNDING)).then(|| {
+        (!at_most(fastest, limit)).then(|| {
             format!(
                 "the program of leaders[{k}] moves a robot at up to {} m/s, above limits.speed: it will fall \
                  behind; give its points more time",
@@ -249,7 +247,7 @@ fn leaping_paths(swarm: &Swarm, formation: &Formation) -> impl Iterator<Item = S
     let reach = swarm.raw.limits.speed.unwrap_or(f64::INFINITY) * swarm.raw.control.period;
     (0..swarm.leaders.len()).filter_map(move |k| {
         let farthest = motions(swarm, formation, k).map(leap).fold(0.0, f64::max);
-        (farthest > reach * (1.0 + ROUNDING)).then(|| {
+        (!at_most(farthest, reach)).then(|| {
             format!(
                 "the program of leaders[{k}] leaps by up to {} m, farther than limits.speed leads in a period: the robot \
                  will be on its way for a while; interpolate it \"linear\" or \"smooth\"",

@@ -1,6 +1,7 @@
 //! Warnings of what becomes of poses and ranges on their way, and of robots that are not heard.
 
 use super::super::{DEVIATIONS_KEPT, largest_noise};
+use crate::flock::rounding::at_most;
 use crate::flock::vectors::distance;
 use crate::scene::swarm::raw::{RawCommandKind, RawFaultKind, RawSwarm};
 use crate::scene::text::decimals;
@@ -43,7 +44,7 @@ pub fn of(raw: &RawSwarm, flight: &Flight) -> Vec<String> {
 impl Network {
     fn noise(&self, raw: &RawSwarm, formation: &Formation) -> Option<String> {
         let largest = largest_noise(formation, raw.limits.clearance)?;
-        (self.params.noise > largest).then(|| {
+        (!at_most(self.params.noise, largest)).then(|| {
             format!(
                 "the noise takes up the space between robots at their places: the filter will hold some of them; lower \
                  {}.noise or limits.clearance, or space the robots out",
@@ -54,7 +55,8 @@ impl Network {
 
     fn delay(&self, raw: &RawSwarm) -> Option<String> {
         let Self { key, params: ChannelParams { delay, jitter, .. } } = self;
-        let is_too_old = |periods: u32| f64::from(periods) * raw.control.period > raw.poses.age_limit;
+        let is_too_old =
+            |periods: u32| !at_most(f64::from(periods) * raw.control.period, raw.poses.age_limit);
         if is_too_old(*delay) {
             return Some(format!(
                 "poses are older than poses.age_limit when they arrive: no robot will get a target; lower {key}.delay or \
@@ -80,7 +82,7 @@ impl Network {
     fn ranges(&self, raw: &RawSwarm) -> Option<String> {
         let ranges = raw.ranges.as_ref()?;
         let off = DEVIATIONS_KEPT * (ranges.noise.powi(2) + 2.0 * self.params.noise.powi(2)).sqrt();
-        (off > ranges.tolerance).then(|| {
+        (!at_most(off, ranges.tolerance)).then(|| {
             format!(
                 "ranges.noise and {}.noise together, at three deviations {} m, are above ranges.tolerance: honest \
                  robots will be taken for liars; lower them, or raise the tolerance",
@@ -132,7 +134,7 @@ fn never_heard(raw: &RawSwarm, flight: &Flight) -> Option<String> {
             formation.number(&fault.robot) == Some(member)
                 && matches!(fault.what, Dead | NotANumber | Silent | WrongFrame)
                 && fault.at <= 0.0
-                && fault.until.is_none_or(|until| until >= end)
+                && fault.until.is_none_or(|until| at_most(end, until))
         })
     };
     let names = formation.named(|m| formation.leads(m) && is_mute(m))?;
