@@ -92,6 +92,17 @@ fn a_strain_that_is_not_defined_is_left_out() {
 }
 
 #[test]
+fn a_robot_alone_has_no_clearance_in_any_table() {
+    let text = "title = \"t\"\nrobots = [{ name = \"a\", place = [0.0, 0.0] }]\nflight = { duration = 1.0 }\n\
+                leaders = [{ robots = [\"a\"], program = { kind = \"external\" } }]\n";
+    let folder = temporary();
+    write(folder.path().join("alone.toml"), text).expect("written");
+    done(&["swarm", "alone.toml", "--out", "out"], folder.path());
+    let samples = read_to_string(folder.path().join("out/samples.csv")).expect("written");
+    assert!(samples.contains("clearance") && !samples.contains("inf"), "{samples}");
+}
+
+#[test]
 fn a_broken_bound_ends_with_exit_code_1_and_all_is_written() {
     let folder = temporary();
     let set = "flight.bounds={ final_error = 1e-30, clearance = 5.0 }";

@@ -373,6 +373,19 @@ fn rounding_breaks_no_bound() {
     assert!(!bounds(found * (1.0 - 1e-6))[0].holds);
 }
 
+/// Each is as near to its own disc as the other to the other's.
+#[test]
+fn robots_far_from_each_other_are_not_named_as_close() {
+    let text = "title = \"t\"\nradius = 0.2\nlinks = { kind = \"listed\" }\nlimits = { speed = 1.0, clearance = 0.2 }\n\
+         robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [100.0, 0.0] }]\n\
+         leaders = [{ robots = [\"a\", \"b\"], program = { kind = \"external\" } }]\n\
+         obstacles = [{ kind = \"disc\", centre = [1.0, 0.0], radius = 0.3 }, { kind = \"disc\", centre = [101.0, 0.0], radius = 0.3 }]\n\
+         flight = { duration = 1.0 }\n";
+    let (_, report) = flown(&parse(text).expect("valid"));
+    let closest = report.closest.expect("near discs");
+    assert_eq!((closest.robots, closest.x), (vec!["a".to_owned()], 0.0));
+}
+
 #[test]
 fn a_broken_bound_names_the_robots_the_time_and_the_place() {
     let swarm = parse(HEAD_ON).expect("valid");

@@ -1,15 +1,20 @@
 //! Measures of a flight, taken from the robots' true places, not from the poses they send. Errors are those of
 //! the robots without a fault at the time.
 
+use serde::Serialize;
+
 use super::Flight;
 use super::acceleration::Accelerations;
 use super::moment::Extreme;
+use crate::flock::rounding::ROUNDING;
 use crate::flock::vectors::{Vectors, distance};
+use crate::geometry::point::minus;
 use crate::scene::swarm::Swarm;
 use crate::swarm::robots::{Model, Robot};
+use crate::swarm::safety::foot;
 
 /// One period of a flight; distances in \[m\].
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sample {
     /// At the end of the period \[s\].
     pub time: f64,
@@ -18,7 +23,8 @@ pub struct Sample {
     /// Largest distance of a robot from its place: of a follower from where the rule comes to rest behind the leaders as
     /// they are, of a leader from where it is led to.
     pub formation_error: Option<f64>,
-    /// Smallest free space between two rims, or a rim and an obstacle, during the period.
+    /// Smallest free space between two rims, or a rim and an obstacle, during the period; infinite where there is neither.
+    #[serde(serialize_with = "finite")]
     pub clearance: f64,
     /// Largest distance from the continuum run of the same scene.
     pub continuum_error: Option<f64>,
@@ -28,6 +34,10 @@ pub struct Sample {
     pub strain: Option<f64>,
     /// Members whose pose is too old to be used, from each one's first pose on.
     pub lost: usize,
+}
+
+fn finite<S: serde::Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    value.is_finite().then_some(*value).serialize(serializer)
 }
 
 /// A flight as it went.
@@ -98,7 +108,14 @@ impl Record {
         self.programs_ended = programs_ended(flight, self.programs_ended);
         let clearance = self.around.iter().copied().fold(f64::INFINITY, f64::min);
         if clearance < self.closest.map_or(f64::INFINITY, |closest| closest.value) {
-            self.closest = Some(closest(&self.around, clearance, &present, time));
+            // As near as their rims may have come: a bend leads aside by no more than a quarter of it.
+            let gap = |a: usize, b: usize| {
+                let apart = |places: &Vectors| minus(places.get(a), places.get(b));
+                let aside = |m| bends.as_ref().map_or(0.0, |bends| 0.25 * distance(bends.get(m), [0.0; 2]));
+                let nearest = distance(foot([apart(before), apart(&present)], [0.0; 2]), [0.0; 2]);
+                nearest - formation.radii[a] - formation.radii[b] - aside(a) - aside(b)
+            };
+            self.closest = Some(closest(&self.around, clearance, gap, &present, time));
         }
         let farthest = |place: &dyn Fn(usize) -> [f64; 2], sound_only: bool| {
             farthest(&present, time, place, |m| !sound_only || flight.fleet().is_sound(m))
@@ -177,14 +194,21 @@ fn bends(flight: &Flight, before: &Vectors) -> Option<Vectors> {
     is_bent.then(|| fleet.robots().iter().enumerate().map(bend).collect())
 }
 
-/// The robots that came that close.
-fn closest(around: &[f64], value: f64, present: &Vectors, time: f64) -> Extreme {
+/// The robots that came that close; one alone that did to an obstacle.
+fn closest(
+    around: &[f64],
+    value: f64,
+    gap: impl Fn(usize, usize) -> f64,
+    present: &Vectors,
+    time: f64,
+) -> Extreme {
     let those = |&m: &usize| around[m] == value;
     let member = (0..around.len()).find(those).unwrap_or(0);
     let here = present.get(member);
-    // Of several pairs that are as close, the one that is.
-    let apart = |&m: &usize| distance(here, present.get(m));
-    let other = (member + 1..around.len()).filter(those).min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    // Others may be as close to something else.
+    let near = (member + 1..around.len()).filter(those).map(|m| (gap(member, m), m));
+    let other = near.filter(|(gap, _)| *gap <= value + ROUNDING).min_by(|a, b| a.0.total_cmp(&b.0));
+    let other = other.map(|(_, m)| m);
     let there = other.map_or(here, |m| present.get(m));
     let place = [0, 1].map(|k| 0.5 * (here[k] + there[k]));
     Extreme { value, member, other, time, place }
