@@ -99,6 +99,16 @@ impl Pose {
     pub fn planar([x, y]: [f64; 2], yaw: f64) -> Self {
         Self { position: Point { x, y, z: 0.0 }, orientation: Quaternion::from_yaw(yaw) }
     }
+
+    /// The entry of an array for a robot of which it says nothing.
+    pub fn nowhere() -> Self {
+        Self::planar([f64::NAN; 2], f64::NAN)
+    }
+
+    /// Whether it is such an entry: no place and no heading. A robot that measures nonsense has a heading at least.
+    pub fn is_nowhere(&self) -> bool {
+        self.position.x.is_nan() && self.position.y.is_nan() && self.orientation.yaw().is_none()
+    }
 }
 
 #[cfg(test)]

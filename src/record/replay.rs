@@ -272,7 +272,7 @@ impl Replay {
             Some(Heard::Poses) => {
                 let Some(PoseArray { header, poses }) = entry.decode() else { return };
                 if poses.len() == self.recorded.len() {
-                    for &member in &self.heard_of {
+                    for &member in self.heard_of.iter().filter(|&&member| !poses[member].is_nowhere()) {
                         self.waiting.push((member, header.clone(), poses[member], entry.published));
                     }
                 }

@@ -17,7 +17,7 @@ use super::edge::pulse::Pulse;
 use super::edge::rosout::Rosout;
 use super::edge::{EdgeError, Node, Publisher, Quality, Subscription};
 use super::network;
-use super::node::pose::is_whole;
+use super::node::pose::{ARRAYS, is_whole};
 use super::node::uses::Uses;
 use super::node::{NodeError, TopicOf, settings};
 use crate::messages::Message;
@@ -134,8 +134,7 @@ enum Poses {
     Stamped(Vec<Publisher<PoseStamped>>),
     WithCovariance(Vec<Publisher<PoseWithCovarianceStamped>>),
     Odometry(Vec<Publisher<Odometry>>),
-    /// With the last pose of each robot.
-    Array(Box<Publisher<PoseArray>>, Vec<geometry_msgs::Pose>),
+    Array(Publisher<PoseArray>),
 }
 
 impl Link {
@@ -190,12 +189,7 @@ impl Link {
             RawPoseType::PoseStamped => Poses::Stamped(each(count, &pose)?),
             RawPoseType::PoseWithCovarianceStamped => Poses::WithCovariance(each(count, &pose)?),
             RawPoseType::Odometry => Poses::Odometry(each(count, &pose)?),
-            RawPoseType::PoseArray => {
-                let topic = first.publisher(&of(&raw.pose_topic, 0)?, Quality::BEST_EFFORT)?;
-                // Nowhere until it says where.
-                let nowhere = geometry_msgs::Pose::planar([f64::NAN; 2], f64::NAN);
-                Poses::Array(Box::new(topic), vec![nowhere; count])
-            }
+            RawPoseType::PoseArray => Poses::Array(first.publisher(&of(&raw.pose_topic, 0)?, ARRAYS)?),
         };
         let range = |m: usize| Ok((&nodes[owner(m)], of(&raw.ranges_topic, m)?));
         let ranges = if swarm.raw.ranges.is_some() { each(count, &range)? } else { Vec::new() };
@@ -413,9 +407,14 @@ impl RobotsEnd for Link {
         if let Some(clock) = &self.clock {
             clock.publish(&Clock { clock: stamp })?;
         }
+        if let Poses::Array(topic) = &self.poses {
+            return arrays(poses, self.names.len(), &self.frame_id)
+                .iter()
+                .try_for_each(|all| topic.publish(all));
+        }
         for (m, pose) in poses {
             let (header, pose) = said(pose, &self.frame_id);
-            match &mut self.poses {
+            match &self.poses {
                 Poses::Stamped(all) => all[*m].publish(&PoseStamped { header, pose })?,
                 Poses::WithCovariance(all) => {
                     all[*m].publish(&PoseWithCovarianceStamped { header, pose: pose.into() })?;
@@ -424,14 +423,28 @@ impl RobotsEnd for Link {
                     let (child_frame_id, pose) = (self.frames[*m].clone(), pose.into());
                     all[*m].publish(&Odometry { header, child_frame_id, pose, ..Odometry::default() })?;
                 }
-                Poses::Array(_, poses) => poses[*m] = pose,
+                Poses::Array(_) => {}
             }
-        }
-        if let (Poses::Array(topic, all), Some((_, last))) = (&self.poses, poses.last()) {
-            topic.publish(&PoseArray { header: said(last, &self.frame_id).0, poses: all.clone() })?;
         }
         Ok(())
     }
+}
+
+/// Poses in arrays, the oldest first: each of those with one stamp and frame, and nowhere for the robots that sent none.
+fn arrays(poses: &[(usize, Pose)], count: usize, frame_id: &str) -> Vec<PoseArray> {
+    let mut arrays: Vec<PoseArray> = Vec::new();
+    for &(m, ref pose) in poses {
+        let (header, pose) = said(pose, frame_id);
+        // What comes twice is sent twice.
+        let has_room = |array: &PoseArray| array.header == header && array.poses[m].is_nowhere();
+        let place = arrays.iter().position(has_room).unwrap_or_else(|| {
+            arrays.push(PoseArray { header, poses: vec![geometry_msgs::Pose::nowhere(); count] });
+            arrays.len() - 1
+        });
+        arrays[place].poses[m] = pose;
+    }
+    arrays.sort_by(|a, b| a.header.stamp.seconds().total_cmp(&b.header.stamp.seconds()));
+    arrays
 }
 
 /// Frame that a robot of a fleet carries (REP 105).

@@ -16,7 +16,7 @@ use flockform::ros::edge::{Node, Quality};
 use flockform::ros::robots::{Layout, RobotNodes};
 use ros2_client::ServiceMapping;
 
-use super::formation::{PATIENT, arguments, square};
+use super::formation::{PATIENT, Swarming, arguments, square};
 use super::support::*;
 
 #[test]
@@ -65,6 +65,29 @@ fn poses_bear_the_time_at_which_robots_are_there_however_late_the_computer_is() 
     };
     let late = stamps.windows(2).filter(|pair| off(pair) > 0.05).count();
     assert!(stamps.len() >= 60 && late <= 6, "{late} of {}: {stamps:?}", stamps.len());
+}
+
+/// As it does with a topic for each robot: the one named drops out, and no other.
+#[test]
+fn an_array_of_poses_has_the_faults_of_each_robot_alone() {
+    let _peers = peers();
+    let faults = "flight.faults=[{ robot = \"robot_2\", at = 0.0, what = { kind = \"silent\" } }, \
+                  { robot = \"robot_3\", at = 0.0, what = { kind = \"not-a-number\" } }, \
+                  { robot = \"robot_25\", at = 0.0, what = { kind = \"wrong-frame\" } }]";
+    let mut swarm =
+        Swarming::open(&square(&[&PATIENT[..], &["node.pose_type=\"pose-array\"", faults]].concat()), &[]);
+    let of = |swarm: &Swarming, m: usize| {
+        let counts = swarm.node.control().watch().counts(m);
+        [counts.accepted, counts.rejected()]
+    };
+    swarm.fly_until("both arrays are heard", |swarm| of(swarm, 0)[0] > 5 && of(swarm, 24)[1] > 5);
+    assert_eq!(of(&swarm, 1), [0, 0], "a silent robot is not there");
+    for m in [2, 24] {
+        assert!(of(&swarm, m)[0] == 0 && of(&swarm, m)[1] > 5, "{m}: {:?}", of(&swarm, m));
+    }
+    for m in (0..24).filter(|m| ![1, 2].contains(m)) {
+        assert!(of(&swarm, m)[0] > 5 && of(&swarm, m)[1] == 0, "{m}: {:?}", of(&swarm, m));
+    }
 }
 
 #[test]

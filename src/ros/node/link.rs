@@ -196,7 +196,7 @@ impl ControllerEnd for Link {
 
 /// The targets of `count` robots as one message; nowhere for robots without one.
 fn array(targets: &[Target], count: usize, header: Header) -> PoseArray {
-    let mut poses = vec![Pose::planar([f64::NAN; 2], f64::NAN); count];
+    let mut poses = vec![Pose::nowhere(); count];
     for target in targets {
         poses[target.member] = Pose::planar(target.position, target.yaw);
     }

@@ -36,6 +36,9 @@ pub struct PoseArrays {
 /// Poses of one member taken in a tick at most: a flood must not hold the loop.
 const MOST_AT_ONCE: usize = 64;
 
+/// Of arrays of poses: those of several stamps may come in one period.
+pub const ARRAYS: Quality = Quality { depth: MOST_AT_ONCE as u16, ..Quality::BEST_EFFORT };
+
 /// Whether an array has a pose of each of `count` robots; complains of one that has not: whose its poses are is not known.
 pub fn is_whole(message: &PoseArray, count: usize, topic: &str, complaints: &mut Complaints) -> bool {
     let poses = message.poses.len();
@@ -64,14 +67,15 @@ impl PoseSource {
             RawPoseType::PoseWithCovarianceStamped => Self::WithCovariance(each(node, members, of)?),
             RawPoseType::Odometry => Self::Odometry(each(node, members, of)?),
             RawPoseType::PoseArray => {
-                let topic = node.subscription(&of(0)?, Quality::BEST_EFFORT)?.steady();
+                let topic = node.subscription(&of(0)?, ARRAYS)?.steady();
                 Self::Array(Box::new(PoseArrays { topic, heard: heard.to_vec(), count, misfits: 0 }))
             }
         })
     }
 
     /// Passes every pose that arrived since the last call to `hear`, and its message to `recorder` with the loop's
-    /// time, and the frame that the message names; an array of another length is left out, with a complaint. Under simulated
+    /// time, and the frame that the message names; an array of another length is left out, with a complaint, and so are entries
+    /// that are nowhere, without one. Under simulated
     /// time `now` \[s\] is given; it replaces the reception time, which DDS takes from the computer's clock.
     pub fn take(
         &mut self,
@@ -102,8 +106,8 @@ impl PoseSource {
                         *misfits += 1;
                         continue;
                     }
-                    for &member in &*heard {
-                        let one = &message.poses[member];
+                    let all = heard.iter().map(|&member| (member, &message.poses[member]));
+                    for (member, one) in all.filter(|(_, one)| !one.is_nowhere()) {
                         hear(member, pose(&message.header, one, stamps), &message.header.frame_id);
                     }
                 }
