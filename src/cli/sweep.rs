@@ -140,7 +140,7 @@ impl Sweep {
             let scene = arguments.load_scene(&[format!("{key}={start}")]);
             scene.is_ok_and(|scene| scene.takes_whole_numbers(key))
         };
-        let design = request.design()?.in_whole_numbers(is_whole);
+        let design = request.design(is_whole)?;
         require_columns(&design, &request.outputs)?;
         let rows = rows.into_iter().map(|row| (row.run, row)).collect();
         let plan_digest = runs::first_digest(&arguments, &design);

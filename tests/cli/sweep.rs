@@ -180,6 +180,7 @@ fn what_cannot_be_swept_is_refused_and_leaves_nothing() {
     sweep(&[&damping[..], &["--shard", "5/4"]].concat(), &["--shard 5/4"]);
     sweep(&[&damping[..], &["--plot", "steps", "--outputs", "residual"]].concat(), &["--plot", "residual"]);
     sweep(&["--vary", "update.damping=0.5:1:4", "--samples", "3"], &["--samples"]);
+    sweep(&["--vary", "stop.steps=1:2:5"], &["two of its 5 values are 1"]);
     refused(&["sweep", "tension"], &["--vary"]);
     refused(&["sweep", "square", "--vary", "a=0:1:2"], &["`square` is a swarm"]);
     refused(&["sweep", "--resume", "nowhere"], &["nowhere.unfinished", "holds a sweep"]);

@@ -37,12 +37,14 @@ pub struct SweepRequest {
 }
 
 impl SweepRequest {
-    /// The runs asked for, those of other shards included.
+    /// The runs asked for, those of other shards included; `is_whole` says of a key, and of where its range begins, that it takes
+    /// whole numbers alone.
     ///
     /// # Errors
     /// Names what is no variation.
-    pub fn design(&self) -> Result<Design, DesignError> {
-        let factors: Vec<Factor> = self.vary.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
+    pub fn design(&self, is_whole: impl Fn(&str, f64) -> bool) -> Result<Design, DesignError> {
+        let factor = |text: &String| Ok(text.parse::<Factor>()?.in_whole_numbers(&is_whole));
+        let factors: Vec<Factor> = self.vary.iter().map(factor).collect::<Result<_, _>>()?;
         match self.samples {
             None => Design::grid(factors),
             Some((count, sampling, seed)) => Design::sampled(factors, count, sampling, seed),
@@ -185,7 +187,7 @@ pub fn read(dir: &Path) -> Result<StoredSweep, SweepError> {
     };
     let begun: JournalHeader = parsed(&folder.join(REQUEST), |text| Ok(serde_json::from_slice(text)?))?;
     let (rows, whole) = parsed(&folder.join(RUNS), whole_rows)?;
-    let design = begun.request.design();
+    let design = begun.request.design(|_, _| false);
     let design = design.map_err(|error| SweepError::unreadable(&folder.join(REQUEST), error))?;
     // A row of a run that the design does not have would be of another request.
     let (runs, outputs) = (design.runs.len(), begun.request.outputs.len());

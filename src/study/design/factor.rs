@@ -19,11 +19,6 @@ impl Level {
         Self { text: text.to_owned(), number: finite(text) }
     }
 
-    /// The same, or the nearest whole number.
-    pub(super) fn rounded(&self) -> Self {
-        self.number.map_or_else(|| self.clone(), |number| Self::of(number.round()))
-    }
-
     /// The shortest text that reads back as the number; a whole one is written as an integer, which keys of both kinds
     /// take.
     fn of(number: f64) -> Self {
@@ -41,6 +36,8 @@ pub struct Factor {
     pub key: String,
     /// Whether it is laid out, and drawn, by its logarithm.
     pub is_log: bool,
+    /// Whether a range has whole numbers alone.
+    is_whole: bool,
     values: Values,
 }
 
@@ -71,10 +68,10 @@ impl FromStr for Factor {
             if levels.is_empty() || levels.iter().any(|level| level.text.is_empty()) {
                 return Err(refuse("a value of the list is missing"));
             }
-            return Ok(Self { key, is_log: false, values: Values::List(levels) });
+            return Ok(Self { key, is_log: false, is_whole: false, values: Values::List(levels) });
         }
         let (ends, count, is_log) = range(values).map_err(|reason| refuse(&reason))?;
-        Ok(Self { key, is_log, values: Values::Range { ends, count } })
+        Ok(Self { key, is_log, is_whole: false, values: Values::Range { ends, count } })
     }
 }
 
@@ -136,6 +133,16 @@ fn elements(list: &str) -> Vec<&str> {
 }
 
 impl Factor {
+    /// With whole numbers alone where the range goes from one to another and `is_whole` says of the key, and of where the range
+    /// begins, that it takes no others.
+    #[must_use]
+    pub fn in_whole_numbers(mut self, is_whole: impl Fn(&str, f64) -> bool) -> Self {
+        if let Values::Range { ends, .. } = self.values {
+            self.is_whole = ends.iter().all(|end| end.fract() == 0.0) && is_whole(&self.key, ends[0]);
+        }
+        self
+    }
+
     /// The value at `part` of the way through the range, or of the list \[1\].
     pub(super) fn at(&self, part: f64) -> Level {
         match &self.values {
@@ -143,26 +150,31 @@ impl Factor {
                 let n = (part * levels.len() as f64) as usize;
                 levels[n.min(levels.len() - 1)].clone()
             }
+            Values::Range { ends, .. } if self.is_whole => Level::of(whole_between(*ends, part, self.is_log)),
             Values::Range { ends, .. } => Level::of(between(*ends, part, self.is_log)),
         }
     }
 
     /// All values of a grid, of which there are as many as [`Factor::count`] says.
-    pub(super) fn levels(&self, count: usize) -> Vec<Level> {
-        match &self.values {
-            Values::List(levels) => levels.clone(),
-            Values::Range { ends, .. } => {
-                let last = count.saturating_sub(1).max(1) as f64;
-                (0..count).map(|n| Level::of(grid_point(*ends, n as f64, last, self.is_log))).collect()
+    ///
+    /// # Errors
+    /// A range in which two of them are the same: their runs would be too.
+    pub(super) fn levels(&self, count: usize) -> Result<Vec<Level>, DesignError> {
+        let ends = match &self.values {
+            Values::List(levels) => return Ok(levels.clone()),
+            Values::Range { ends, .. } => *ends,
+        };
+        let last = count.saturating_sub(1).max(1) as f64;
+        let at = |n: usize| grid_point(ends, n as f64, last, self.is_log);
+        let of = |n: usize| Level::of(if self.is_whole { at(n).round() } else { at(n) });
+        let levels: Vec<Level> = (0..count).map(of).collect();
+        match levels.windows(2).find(|pair| pair[0] == pair[1]) {
+            None => Ok(levels),
+            Some(pair) => {
+                let reason =
+                    format!("two of its {count} values are {}: take fewer, or a wider range", pair[0].text);
+                Err(DesignError::Vary { text: self.to_string(), reason })
             }
-        }
-    }
-
-    /// Where the range begins, if it goes from one whole number to another.
-    pub(super) fn whole_start(&self) -> Option<f64> {
-        match self.values {
-            Values::Range { ends, .. } => ends.iter().all(|end| end.fract() == 0.0).then_some(ends[0]),
-            Values::List(_) => None,
         }
     }
 
@@ -210,6 +222,12 @@ fn between([from, to]: [f64; 2], part: f64, is_log: bool) -> f64 {
         true => (from.ln() + part * (to.ln() - from.ln())).exp(),
         false => from + part * (to - from),
     }
+}
+
+/// The whole number at `part` of the way: all have as much of it, or, by the logarithm, as much as the step to the next has.
+fn whole_between([from, to]: [f64; 2], part: f64, is_log: bool) -> f64 {
+    let ends = if from <= to { [from, to + 1.0] } else { [from + 1.0, to] };
+    between(ends, part, is_log).floor().clamp(from.min(to), from.max(to))
 }
 
 /// The `n`th of `last + 1` values; the ends are exact, and so are round steps (0.3 between 0.1 and 0.5).

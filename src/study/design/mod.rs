@@ -70,7 +70,7 @@ impl Design {
     /// Every combination of the keys' values; the last key changes from each run to the next.
     ///
     /// # Errors
-    /// A key that is given twice, a range without a number of values, or too many runs.
+    /// A key that is given twice, a range without a number of values or with one value twice, or too many runs.
     pub fn grid(factors: Vec<Factor>) -> Result<Self, DesignError> {
         require_distinct(&factors)?;
         // Counted before anything is laid out: what is too much for the memory is refused, not tried.
@@ -78,7 +78,7 @@ impl Design {
         let product = counts.iter().try_fold(1_usize, |product, &count| product.checked_mul(count));
         let count = product.filter(|&runs| fits(runs, factors.len())).ok_or(DesignError::TooMany)?;
         let levels: Vec<Vec<Level>> =
-            factors.iter().zip(counts).map(|(one, count)| one.levels(count)).collect();
+            factors.iter().zip(counts).map(|(one, count)| one.levels(count)).collect::<Result<_, _>>()?;
         let run = |number: usize| {
             let mut rest = number;
             let mut values: Vec<Level> = levels
@@ -123,17 +123,6 @@ impl Design {
         let columns: Vec<Vec<Level>> = columns.collect();
         let run = |number: usize| columns.iter().map(|column| column[number].clone()).collect();
         Ok(Self { runs: (0..samples).map(run).collect(), factors })
-    }
-
-    /// The same with whole numbers alone for keys of which `is_whole` says that they take no others, with where their range begins.
-    #[must_use]
-    pub fn in_whole_numbers(mut self, is_whole: impl Fn(&str, f64) -> bool) -> Self {
-        for (k, factor) in self.factors.iter().enumerate() {
-            if factor.whole_start().is_some_and(|start| is_whole(&factor.key, start)) {
-                self.runs.iter_mut().for_each(|run| run[k] = run[k].rounded());
-            }
-        }
-        self
     }
 
     /// The overrides of a run.
@@ -244,16 +233,38 @@ mod tests {
     #[test]
     fn keys_that_take_whole_numbers_get_them() {
         let whole = |key: &str, start: f64| key == "stop.steps" && start == 100.0;
-        let grid =
-            Design::grid(factors(&["stop.steps=100:200:4", "a=0:1:4"])).unwrap().in_whole_numbers(whole);
+        let of = |texts: &[&str]| -> Vec<Factor> {
+            factors(texts).into_iter().map(|one| one.in_whole_numbers(whole)).collect()
+        };
+        let grid = Design::grid(of(&["stop.steps=100:200:4", "a=0:1:4"])).unwrap();
         assert_eq!(grid.overrides(6), ["stop.steps=133", "a=0.6666666666666666"]);
-        let some = Design::sampled(factors(&["stop.steps=100:200"]), 9, Sampling::LatinHypercube, 0).unwrap();
-        let some = some.in_whole_numbers(whole);
-        assert!(column(&some, 0).iter().all(|text| (100..=200).contains(&text.parse::<i32>().unwrap())));
         // A range between others is of a key that takes those.
-        let between =
-            Design::grid(factors(&["stop.steps=100:200.5:3"])).unwrap().in_whole_numbers(|_, _| true);
-        assert_eq!(column(&between, 0)[1], "150.25");
+        assert_eq!(column(&Design::grid(of(&["stop.steps=100:200.5:3"])).unwrap(), 0)[1], "150.25");
+        let error = Design::grid(of(&["stop.steps=100:102:6"])).expect_err("the same twice").to_string();
+        assert!(error.contains("two of its 6 values are 100: take fewer"), "{error}");
+    }
+
+    #[test]
+    fn all_whole_numbers_of_a_range_are_drawn_as_often() {
+        for (text, sampling, off) in [
+            ("k=1:4", Sampling::LatinHypercube, 0),
+            ("k=4:1", Sampling::LatinHypercube, 0),
+            ("k=-2:1", Sampling::Random, 50),
+        ] {
+            let factor = text.parse::<Factor>().expect("a factor").in_whole_numbers(|_, _| true);
+            let design = Design::sampled(vec![factor], 1200, sampling, 0).unwrap();
+            let mut counts = std::collections::BTreeMap::new();
+            column(&design, 0).into_iter().for_each(|value| *counts.entry(value).or_insert(0_i32) += 1);
+            assert!(
+                counts.len() == 4 && counts.values().all(|n| (n - 300).abs() <= off),
+                "{text}: {counts:?}"
+            );
+        }
+        // By ratios, from one to two has as much as from two to four.
+        let factor = "k=1:3:log".parse::<Factor>().expect("a factor").in_whole_numbers(|_, _| true);
+        let design = Design::sampled(vec![factor], 1000, Sampling::LatinHypercube, 0).unwrap();
+        let ones = column(&design, 0).into_iter().filter(|value| *value == "1").count();
+        assert_eq!(ones, 500);
     }
 
     #[test]
