@@ -27,6 +27,7 @@ use flockform::ranks::Team;
 use flockform::record::About;
 use flockform::record::body::BodyMessages;
 use flockform::scene::Scene;
+use flockform::scene::document::is_lost_to;
 use flockform::shm::Domain;
 use flockform::shm::positions::Positions;
 use flockform::solve::interrupt::Interrupt;
@@ -38,6 +39,7 @@ use words::{closing_words, where_to_look};
 
 use super::checkpoint::{CheckpointArguments, Checkpointer, ResumedRun, resume_words};
 use super::film::{FilmArguments, Finish};
+use super::material::wrong;
 use super::names::{FileName, Overrides, SceneArguments, in_full};
 use super::output::{FigureArguments, OutputArguments, ReportArguments, command_line};
 use super::progress::Progress;
@@ -104,6 +106,7 @@ struct Prepared {
 
 impl Prepared {
     fn new(arguments: &RunArguments, team: Option<&Team>, begin: &mut Start<'_>) -> Result<Self, Refusal> {
+        arguments.require_one_end()?;
         let mut left = arguments.checkpoints.left()?;
         let asked = arguments.asked(left.as_ref());
         let words_of = SceneArguments::new(&asked.scene, &asked.set);
@@ -340,6 +343,14 @@ impl RunArguments {
         let asked = (self.outputs(), self.checkpoints.every(), self.record.is_asked());
         all.extend(format!("{:?} {asked:?} {:?}", scene.roles, self.publish).bytes());
         fnv1a(&all)
+    }
+
+    /// Refuses two numbers of steps, of which one would be lost.
+    fn require_one_end(&self) -> Result<(), Refusal> {
+        let set = self.overrides.set.iter().find(|set| is_lost_to(set, "stop.steps"));
+        let (Some(steps), Some(set)) = (self.steps, set) else { return Ok(()) };
+        let message = format!("{steps} steps are asked for, and `--set {set}` says how many too");
+        Err(wrong("--steps", message, "leave one of the two out").into())
     }
 
     /// The requested run, independent of the working folder.

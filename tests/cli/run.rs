@@ -428,6 +428,8 @@ fn unknown_arguments_are_refused() {
     refused(&["fly"], &["fly"]);
     refused(&["run", "tension", "--threads", "0"], &["--threads"]);
     refused(&["run", "tension", "--steps", "-3"], &["-3"]);
+    let both = ["run", "tension", "--steps", "3", "--set", "stop.steps=2"];
+    refused(&both, &["--steps", "`--set stop.steps=2`", "leave one of the two out"]);
 }
 
 #[test]
