@@ -41,7 +41,7 @@ pub enum Edit {
         /// A name that no other has.
         name: String,
     },
-    /// Has a robot lead, by the first program of the file, or follow.
+    /// Has a robot lead, by the first program of the file where it does not lead yet, or follow.
     Lead {
         /// The robot.
         robot: usize,
@@ -152,13 +152,16 @@ impl Edit {
             Edit::Lead { robot, leads } => {
                 let robot = known(*robot)?;
                 let name = raw.robots[robot].name.clone();
-                raw.leaders.iter_mut().for_each(|entry| entry.robots.retain(|led| *led != name));
-                if *leads {
+                let is_led = raw.leaders.iter().any(|entry| entry.robots.contains(&name));
+                if *leads && !is_led {
                     lead(raw, robot);
-                } else if raw.robots[robot].neighbours.is_empty() {
-                    link_to_nearest(raw, robot);
+                } else if !*leads {
+                    raw.leaders.iter_mut().for_each(|entry| entry.robots.retain(|led| *led != name));
+                    raw.leaders.retain(|entry| !entry.robots.is_empty());
+                    if raw.robots[robot].neighbours.is_empty() {
+                        link_to_nearest(raw, robot);
+                    }
                 }
-                raw.leaders.retain(|entry| !entry.robots.is_empty());
             }
             Edit::Remove { robot } => {
                 let RawRobot { name, .. } = raw.robots.remove(known(*robot)?);

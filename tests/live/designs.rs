@@ -169,6 +169,19 @@ fn edits() -> impl Strategy<Value = Edit> {
     ]
 }
 
+#[test]
+fn a_leader_that_is_made_to_lead_keeps_its_program() {
+    let still = "program = { kind = \"external\" }";
+    let two =
+        format!("leaders=[{{ robots = [\"robot_1\"], {still} }}, {{ robots = [\"robot_25\"], {still} }}]");
+    let mut live = begun("square", &[&two, "rule={}", "flight.bounds={}"]);
+    let robot = number(&live, "robot_25");
+    edit(&mut live, Edit::Lead { robot, leads: true });
+    let leaders = saved(&live).raw.leaders;
+    let led: Vec<&[String]> = leaders.iter().map(|entry| &entry.robots[..]).collect();
+    assert_eq!(led, [["robot_1"], ["robot_25"]]);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
 
