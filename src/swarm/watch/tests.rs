@@ -55,6 +55,8 @@ fn a_pose_exactly_as_old_as_a_limit_is_within_it_whatever_rounding_makes_of_its_
         let time = |period: i32| 0.1 * f64::from(period);
         let mut watch = Watch::new(1, limits);
         assert_eq!(watch.receive(0, pose(1.0, time(period)), time(period + 3)), Ok(()), "in {period}");
+        let mut watch = Watch::new(1, limits);
+        assert_eq!(watch.receive(0, pose(1.0, time(period)), time(period)), Ok(()));
         for (later, health) in [(2, Health::Fresh), (3, Health::Held), (4, Health::Degraded)] {
             watch.look(time(period + later));
             assert_eq!(watch.health(0), health, "{later} after {period}");
