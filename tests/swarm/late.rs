@@ -201,6 +201,28 @@ fn robots_that_turn_or_were_stuck_arrive_whatever_the_age_of_their_poses() {
     }
 }
 
+/// While it is seen where it stood, a robot that was sent on already does not start over again and again, and leap then.
+#[test]
+fn a_robot_that_starts_behind_late_poses_gathers_speed_as_its_limit_lets_it() {
+    for (delay, period) in [(2, 0.1), (3, 0.1), (6, 0.05)] {
+        let text = format!(
+            "title = \"one\"\nradius = 0.2\nlinks = {{ kind = \"listed\" }}\nrobots = [{{ name = \"a\", place = [0.0, 0.0] }}]\n\
+             leaders = [{{ robots = [\"a\"], program = {{ kind = \"path\", interpolation = \"hold\", points = [{{ at = 0.01, displacement = [3.0, 0.0] }}] }} }}]\n\
+             limits = {{ speed = 2.0, acceleration = 0.5 }}\ncontrol = {{ period = {period} }}\n\
+             flight = {{ duration = 12.0, model = {{ kind = \"integrator\" }}, delay = {delay} }}\n"
+        );
+        let (record, _) = flown(&parse(&text).expect("a swarm"));
+        let along: Vec<f64> = record.tracks.iter().map(|places| places.get(0)[0]).collect();
+        let change = along.windows(3).map(|at| (at[2] - 2.0 * at[1] + at[0]).abs()).fold(0.0, f64::max);
+        assert!(
+            change <= 0.5 * period * period * (1.0 + 1e-9),
+            "{delay}, {period}: {}",
+            change / period / period
+        );
+        assert!((along[along.len() - 1] - 3.0).abs() < 1e-6, "{delay}, {period}: {along:?}");
+    }
+}
+
 #[test]
 fn a_robot_that_was_carried_away_is_led_from_where_it_is() {
     const AGE: f64 = 0.03;

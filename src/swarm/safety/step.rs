@@ -142,8 +142,12 @@ impl Filter {
         let velocity = self.velocity(seen, member)?;
         let [last, before] = [&self.sent, &self.sent_before].map(|sent| sent.get(member));
         let is_known = last.iter().chain(&before).all(|x| x.is_finite());
-        if self.brakes(seen) || !is_known || !self.is_inexact(seen, period, member) {
+        if self.brakes(seen) || !self.is_inexact(seen, period, member) {
             return Some(velocity);
+        }
+        if !is_known {
+            // What noise makes of two places may be any velocity: one that was sent nowhere yet is taken to stand.
+            return Some(if self.limits.deviation > 0.0 { [0.0; 2] } else { velocity });
         }
         Some(shortened([0, 1].map(|k| (last[k] - before[k]) / period), self.limits.speed))
     }
