@@ -56,7 +56,13 @@ impl Filter {
         let way = minus(wanted, here);
         let velocity = self.motion(seen, period, member);
         let mut request = self.request(velocity, way, period, most);
-        let origins = self.enclose(seen, &mut request, here, member);
+        let mut origins = self.enclose(seen, &mut request, here, member);
+        let whole = self.limits.speed * period;
+        if most < whole && self.cell.is_left() {
+            // What it was sent to is no longer its own: it is not waited for.
+            request = self.request(velocity, way, period, whole);
+            origins = self.enclose(seen, &mut request, here, member);
+        }
         let open = shortened(way, request.reach);
         let mut flags = self.why(open, origins);
         if velocity.is_some() && !brakes {
