@@ -11,6 +11,7 @@ use flockform::engine::Engine;
 use flockform::engine::state::EngineState;
 use flockform::export::checkpoint::{Checkpoint, CheckpointError, RunRequest};
 use flockform::export::report::RunRecorder;
+use flockform::export::shell::quoted;
 use flockform::export::{ExportError, OutputFolder, Records, VtkSeries, out_of, unfinished};
 use flockform::scene::Scene;
 
@@ -323,7 +324,8 @@ fn warn_of(what: &str, error: &ExportError) {
 
 /// The message of a run that is left to be gone on with.
 pub fn resume_words(folder: &OutputFolder) -> String {
-    format!("interrupted: `flockform run --resume {}` goes on", folder.folder().display())
+    let folder = quoted(&folder.folder().to_string_lossy());
+    format!("interrupted: `flockform run --resume {folder}` goes on")
 }
 
 #[cfg(test)]

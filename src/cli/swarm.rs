@@ -123,8 +123,9 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let interrupted = interrupt::keeps();
     let start = Instant::now();
     let mut watch = |flight: &Flight, _: &Sample| {
-        recorder.iter_mut().for_each(|recorder| recorder.watch(flight));
-        if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        let is_last = interrupted.load(Ordering::Relaxed);
+        recorder.iter_mut().for_each(|recorder| recorder.watch(flight, is_last));
+        if is_last { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let (record, report) = fly_recorded(&swarm, flight.control(), recording.as_ref(), &mut watch)?;
     let seconds = start.elapsed().as_secs_f64();

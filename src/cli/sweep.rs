@@ -8,6 +8,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Args;
+use flockform::export::shell::quoted;
 use flockform::export::sweep::{
     Journal, JournalHeader, Output, Row, StoredSweep, SweepError, SweepRequest, Table, read, write_sweep,
 };
@@ -286,7 +287,8 @@ fn sweep_here(arguments: &SweepArguments) -> Result<ExitCode, Refusal> {
     let first = if found.is_none() && !pending.is_empty() { runs.first(&pending)? } else { Vec::new() };
     let interrupted = interrupt::keeps();
     let (folder, journal) = open(arguments, found.as_ref(), &sweep)?;
-    let words = format!("interrupted: `flockform sweep --resume {}` goes on", folder.folder().display());
+    let begun = quoted(&folder.folder().to_string_lossy());
+    let words = format!("interrupted: `flockform sweep --resume {begun}` goes on");
     interrupt::says(words.clone());
     for row in first {
         journal.add(&row)?;
@@ -361,7 +363,7 @@ fn merge(arguments: &SweepArguments, start: Instant) -> Result<ExitCode, Refusal
         "{} {} missing, the first is run {first}: `flockform sweep --resume {}` makes {}",
         counted(count, "run"),
         if count == 1 { "is" } else { "are" },
-        out.display(),
+        quoted(&out.to_string_lossy()),
         if count == 1 { "it" } else { "them" }
     );
     Ok(ExitCode::from(FAILED))

@@ -245,7 +245,8 @@ impl Conductor {
     fn save(&self, viewer: Viewer) {
         let said = match self.session.saved(Some(&self.folder)).and_then(|text| self.write(&text)) {
             Ok(path) => {
-                let command = format!("flockform {} {}", self.session.runner(), path.display());
+                let command =
+                    format!("flockform {} {}", self.session.runner(), quoted(&path.to_string_lossy()));
                 json!({ "event": "saved", "path": path, "command": command })
             }
             Err(words) => json!({ "event": "refused", "words": words }),

@@ -178,7 +178,8 @@ pub enum Effect {
 pub struct Waves {
     /// Whether every wave but a translation costs energy.
     pub stable: bool,
-    /// Least cost of a wave, relative to that of springs between nearest neighbours \[1\].
+    /// Least cost of a wave, relative to that of springs along the two translations of the lattice that resist a particle's motion as
+    /// much \[1\].
     pub least: f64,
     /// The wave of that cost \[1/length\], and its length \[length\].
     pub worst: [f64; 2],

@@ -41,6 +41,13 @@ fn increments_of_a_linear_body_lie_on_a_line_and_a_schedule_comes_back() {
     let (folder, said) = bundled("beam-loaded", &["load_steps={increments=4}"]);
     assert!(said.contains("increment 4"), "{said}");
     let rows = table(folder.path().join("o/load.csv"));
+    let sets = ["--set", "load_steps={increments=4}", "--set", "record.probes=[1]"];
+    done(
+        &[&["run", "beam-loaded", "--out", "p", "--no-report", "--figures", "svg"], &sets[..]].concat(),
+        folder.path(),
+    );
+    let probes = read(folder.path().join("p/probes.svg"));
+    assert!(probes.contains(">increment<"), "{probes}");
     assert_eq!(rows["increment"], [0.0, 1.0, 2.0, 3.0, 4.0]);
     assert_eq!(rows["factor"], [0.0, 0.25, 0.5, 0.75, 1.0]);
     for (name, power) in [

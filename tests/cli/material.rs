@@ -105,6 +105,19 @@ fn eq_1_on_a_square_lattice_is_a_material_of_poisson_ratio_minus_one() {
 }
 
 #[test]
+fn a_lattice_of_any_size_has_its_digits() {
+    let said = said(&["--lattice", "square", "--spacing", "1e-6"]);
+    for words in [
+        "[  1.00000e-6    0.00000e0]",
+        "1.000000e-6 apart",
+        "-8.33333333e-14 along",
+        "1.0000 of what springs",
+    ] {
+        assert!(said.contains(words), "no `{words}` in\n{said}");
+    }
+}
+
+#[test]
 fn hexagonal_weights_have_the_closed_form() {
     for nu in ["-0.9", "0", "0.3333333333333333", "0.45"] {
         let report =

@@ -151,6 +151,7 @@ fn runs_that_the_scene_refuses_are_rows_that_say_why() {
         (json[1]["update.damping"].as_f64(), json[1]["stop_reason"].as_str()),
         (Some(-1.0), Some("refused"))
     );
+    assert!(json[0]["residual"].is_f64() && json[1]["residual"].is_null(), "{json}");
 }
 
 #[test]

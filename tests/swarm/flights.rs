@@ -373,6 +373,19 @@ fn rounding_breaks_no_bound() {
     assert!(!bounds(found * (1.0 - 1e-6))[0].holds);
 }
 
+#[test]
+fn a_flight_that_is_broken_off_has_the_places_of_its_end() {
+    let swarm = load_swarm("square", &["flight.record_every=5"]);
+    let mut places = None;
+    let (record, report) = fly(&swarm, &mut |flight, _| {
+        places = Some(flight.fleet().places());
+        if flight.fleet().period() == 7 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })
+    .expect("flies");
+    assert_eq!((record.times.len(), record.times.last()), (3, Some(&report.seconds)));
+    assert_eq!(record.tracks.last(), places.as_ref());
+}
+
 /// Each is as near to its own disc as the other to the other's.
 #[test]
 fn robots_far_from_each_other_are_not_named_as_close() {

@@ -11,12 +11,12 @@ const MOST_LINES: usize = SERIES.len();
 
 /// The charts of probed particles on one sheet.
 pub fn probes(subject: &Subject<'_>, probes: &[ProbeSeries]) -> String {
-    draw_panels(subject.title, &charts(probes, subject.body, subject.unit))
+    draw_panels(subject.title, &charts(probes, subject.body, [subject.unit, subject.counts]))
 }
 
-/// Displacements and pseudo-energies of the probed particles against the step; a chart in which nothing happens is left
+/// Displacements and pseudo-energies of the probed particles against what the run `counts`; a chart in which nothing happens is left
 /// out, unless nothing happens in any.
-pub fn charts(probes: &[ProbeSeries], body: &Body, unit: &str) -> Vec<Chart> {
+pub fn charts(probes: &[ProbeSeries], body: &Body, [unit, counts]: [&str; 2]) -> Vec<Chart> {
     if probes.is_empty() {
         return Vec::new();
     }
@@ -40,7 +40,7 @@ pub fn charts(probes: &[ProbeSeries], body: &Body, unit: &str) -> Vec<Chart> {
             let points = values(probe).into_iter().enumerate().map(|(step, value)| [step as f64, value]);
             Series::new(body.id_of(probe.particle).to_string(), colour, Style::Line, points.collect())
         };
-        let axes = [Axis::new("step", ""), Axis::new(quantity, unit)];
+        let axes = [Axis::new(counts, ""), Axis::new(quantity, unit)];
         let series = shown.iter().zip(SERIES).map(line).collect();
         Chart { follows_clock: true, ..Chart::new(quantity, note.clone(), axes, series) }
     };

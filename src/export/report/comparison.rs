@@ -101,7 +101,8 @@ fn stage(
         let part = frame as f64 / FRAMES as f64;
         let scaled =
             [&moved.x[..], &moved.y, stress, error].map(|v| v.iter().map(|v| part * v).collect::<Vec<f64>>());
-        frames.keep(frame, |k, _| (&scaled[k]).into());
+        let values = |k: usize, _: &Channel| (&scaled[k]).into();
+        if frame == FRAMES { frames.keep_last(frame, values) } else { frames.keep(frame, values) }
     }
     let encoded = encoded(&mut frames, stage.size());
     let times = frames.kept().iter().map(|frame| 100.0 * frame.step as f64 / FRAMES as f64).collect();

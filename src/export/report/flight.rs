@@ -51,7 +51,7 @@ const OF_MOTION: [&str; 2] = ["speed", "acceleration"];
 /// Distance of every robot from where the rule comes to rest with the leaders as they are \[m\]; `None` where that is
 /// not known.
 pub(crate) fn from_places(control: &Control, places: &Vectors) -> Option<Vec<f64>> {
-    let rest = control.formation().settled(places)?;
+    let rest = control.settled_at(places)?;
     Some(rest.iter().zip(places.iter()).map(|(rest, place)| distance(rest, place)).collect())
 }
 
@@ -87,11 +87,11 @@ impl FlightRecorder {
         recorder
     }
 
-    /// Looks at a period just flown.
-    pub fn watch(&mut self, flight: &Flight) {
+    /// Looks at a period just flown, after which there may be no other: `is_last` says so of one that is not that of the file.
+    pub fn watch(&mut self, flight: &Flight, is_last: bool) {
         let (fleet, period) = (flight.fleet(), flight.fleet().period());
         let velocities: Vec<[f64; 2]> = fleet.robots().iter().map(|robot| robot.velocity).collect();
-        let is_last = period == flight.periods();
+        let is_last = is_last || period == flight.periods();
         if is_last || self.frames.wants(period as usize) {
             let speed: Vec<f64> = velocities.iter().map(|[x, y]| x.hypot(*y)).collect();
             let change = velocities.iter().zip(&self.velocities);
@@ -344,13 +344,32 @@ mod tests {
     use crate::scene::bundled::bundled_swarm;
 
     #[test]
+    fn no_robot_has_a_distance_from_a_place_that_is_not_known_and_a_flight_that_ends_early_has_its_end() {
+        let dead = r#"flight.faults=[{ robot = "robot_1", at = 0.5, what = { kind = "dead" } }]"#;
+        let swarm = bundled_swarm("square").expect("bundled").load_swarm(&[dead.into()]).expect("valid");
+        let mut flight = Flight::new(&swarm).expect("flies");
+        let mut recorder = FlightRecorder::new(&flight);
+        recorder.frames.halve();
+        for period in 1..=63 {
+            flight.step();
+            recorder.watch(&flight, period == 63);
+        }
+        let last = recorder.frames().len() - 1;
+        assert_eq!(recorder.frames()[last].step, 63);
+        assert_eq!(flight.control().settled(), None, "a leader is lost");
+        let away = |frame: usize| recorder.values(frame, "away").expect("known");
+        assert!(away(1).iter().all(|away| away.is_finite()));
+        assert!(away(last).iter().all(|away| away.is_nan()), "{:?}", away(last));
+    }
+
+    #[test]
     fn a_quantity_of_a_frame_is_found_by_its_name() {
         let swarm = bundled_swarm("square").expect("bundled").load_swarm(&[]).expect("valid");
         let mut flight = Flight::new(&swarm).expect("flies");
         let mut recorder = FlightRecorder::new(&flight);
         for _ in 0..64 {
             flight.step();
-            recorder.watch(&flight);
+            recorder.watch(&flight, false);
         }
         let last = recorder.frames().len() - 1;
         assert_eq!(recorder.frames()[last].step as u64, flight.periods().min(64));

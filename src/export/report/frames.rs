@@ -89,11 +89,10 @@ impl Frames {
         if self.kept.len() >= self.most {
             self.interval *= 2;
             self.thin();
-            if !self.wants(step) {
-                return;
-            }
         }
-        self.push(step, values);
+        if self.wants(step) {
+            self.push(step, values);
+        }
     }
 
     /// Keeps the last frame, whatever its step.
@@ -167,6 +166,23 @@ mod tests {
             assert!(kept.len() > MOST_FRAMES / 2 || frames.interval() == 1, "{steps}: {}", kept.len());
             let [most, at_end] = frames.of_steps(steps);
             assert!(kept.len().abs_diff(at_end) <= 1 && most >= at_end, "{steps}: {most}, {at_end}");
+        }
+    }
+
+    #[test]
+    fn a_few_frames_are_evenly_spaced_too_and_end_at_the_end() {
+        for most in 4..12 {
+            let mut frames = Frames::new(1, vec![Channel { name: "dx", bits: 16 }]);
+            frames.most = most;
+            (0..20).for_each(|step| frames.keep(step, |_, _| vec![step as f64].into()));
+            frames.keep_last(20, |_, _| vec![20.0].into());
+            let kept: Vec<usize> = frames.kept().iter().map(|frame| frame.step).collect();
+            let (last, even) = kept.split_last().expect("kept");
+            assert!(*last == 20 && 2 * even.len() >= most && even.len() <= most, "{most}: {kept:?}");
+            assert!(
+                even.iter().enumerate().all(|(k, &step)| step == k * frames.interval()),
+                "{most}: {kept:?}"
+            );
         }
     }
 

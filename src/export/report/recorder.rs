@@ -225,6 +225,10 @@ impl RunRecorder {
             let whole = OnceCell::new();
             let displacements = self.sample.as_ref().map(|_| engine.displacements());
             for frame in 0..=LOAD_FRAMES {
+                // Of a body of millions not all find room.
+                if frame < LOAD_FRAMES && !self.frames.wants(frame) {
+                    continue;
+                }
                 let part = frame as f64 / LOAD_FRAMES as f64;
                 let of_sample = self.sample.as_ref();
                 let under = displacements.as_ref().map(|u| displaced(&engine.body().reference, u, part));
@@ -234,7 +238,11 @@ impl RunRecorder {
                     true => whole.get_or_init(|| von_mises(engine, 1.0)).iter().map(|v| part * v).collect(),
                 };
                 let seen = Seen { engine, sample: of_sample, part, places, stress: &stress };
-                self.frames.keep(frame, |_, channel| seen.values(channel).into());
+                let values = |_: usize, channel: &Channel| seen.values(channel).into();
+                match frame {
+                    LOAD_FRAMES => self.frames.keep_last(frame, values),
+                    _ => self.frames.keep(frame, values),
+                }
             }
         } else {
             let stress = || von_mises(engine, 1.0);

@@ -26,7 +26,8 @@ pub fn write(
     stage: View,
 ) -> Result<PathBuf, ExportError> {
     let (scene, outcome) = (results.scene, results.outcome);
-    let mut plots = probes::charts(&results.records.probes, outcome.engine.body(), scene.unit());
+    let mut plots =
+        probes::charts(&results.records.probes, outcome.engine.body(), [scene.unit(), scene.counts()]);
     let units = Units::of(scene);
     plots.extend(load::chart(scene, &units, &results.records.load_steps));
     plots.extend(outcome.solved.as_ref().and_then(|solved| chart::residuals(&solved.residuals)));

@@ -54,11 +54,17 @@ impl Table<'_> {
         })
     }
 
-    /// The table as JSON: an object for each run, numbers as numbers.
+    /// The table as JSON: an object for each run, numbers as numbers and outputs without a value as none.
     pub fn json(&self) -> serde_json::Value {
         let head = self.head();
+        let first = 1 + self.design.factors.len();
+        let outputs = first..first + self.outputs.len();
+        let value = |(k, text): (usize, &String)| match text.is_empty() && outputs.contains(&k) {
+            true => serde_json::Value::Null,
+            false => cell(text),
+        };
         let object = |cells: Vec<String>| -> serde_json::Value {
-            head.iter().map(|&name| name.to_owned()).zip(cells.iter().map(|text| cell(text))).collect()
+            head.iter().map(|&name| name.to_owned()).zip(cells.iter().enumerate().map(value)).collect()
         };
         self.cells().map(object).collect()
     }

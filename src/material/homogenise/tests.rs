@@ -211,6 +211,8 @@ fn springs_along_two_axes_alone_are_a_mechanism() {
 fn the_largest_eigenvalue_is_that_of_the_rule() {
     let eq_1 = scalar(KINDS[0], FIRST).zone().expect("symmetric");
     assert!((eq_1.largest - 2.0).abs() < 1e-12 && eq_1.stable);
+    // It is the springs that waves are measured by.
+    assert!((eq_1.least - 1.0).abs() < 1e-9, "{}", eq_1.least);
     assert!((scalar(KINDS[3], FIRST).zone().expect("symmetric").largest - 1.5).abs() < 1e-9);
     // The two kinds of sites against each other, everywhere alike.
     let honeycomb = scalar(LatticeKind::Honeycomb { spacing: 1.0 }, FIRST).zone().expect("symmetric");
@@ -227,8 +229,8 @@ fn the_largest_eigenvalue_is_that_of_the_rule() {
             .zone()
             .expect("symmetric");
         assert!(zone.stable, "{kind:?}");
-        // Cells bent in turn resist least: those of assumed stress without right angles 0.049, bilinear ones twice as much.
-        assert!(zone.least > 0.045 && zone.largest < 3.0, "{kind:?} {zone:?}");
+        // Cells bent in turn resist least: those of assumed stress without right angles 0.2, bilinear ones twice as much.
+        assert!(zone.least > 0.18 && zone.largest < 3.0, "{kind:?} {zone:?}");
     }
 }
 

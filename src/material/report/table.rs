@@ -17,7 +17,8 @@ impl fmt::Display for MaterialReport {
         let (lattice, spacing) = (self.lattice.kind, self.lattice.spacing);
         writeln!(
             f,
-            "{lattice} lattice, nearest sites {spacing:.6} apart, {neighbours} neighbours: {}",
+            "{lattice} lattice, nearest sites {} apart, {neighbours} neighbours: {}",
+            lengths([spacing], 6)[0],
             self.rule
         )?;
         if let Some(asked) = &self.asked {
@@ -76,9 +77,21 @@ fn settled(value: f64) -> f64 {
     if value.abs() < 1e-14 { 0.0 } else { value }
 }
 
+/// Components of a vector, to so many digits behind the point, or in powers of ten where that is shorter.
+fn lengths<const N: usize>(vector: [f64; N], digits: usize) -> [String; N] {
+    let size = vector.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let is_plain = size == 0.0 || (1e-2..1e5).contains(&size);
+    // What is left of a cancellation is no length.
+    vector.map(|x| if x.abs() < 1e-14 * size { 0.0 } else { x }).map(|x| match is_plain {
+        true => format!("{x:.digits$}"),
+        false => format!("{x:.digits$e}"),
+    })
+}
+
 fn place(f: &mut fmt::Formatter<'_>, weight: &Weight) -> fmt::Result {
-    let ([i, j], [x, y]) = (weight.offset, weight.vector.map(settled));
-    write!(f, "  {i:3} {j:3}   [{x:9.5} {y:9.5}]  {:7.2} deg", settled(weight.direction))
+    let ([i, j], [x, y]) = (weight.offset, lengths(weight.vector, 5));
+    let width = if x.contains('e') { 12 } else { 9 };
+    write!(f, "  {i:3} {j:3}   [{x:>width$} {y:>width$}]  {:7.2} deg", settled(weight.direction))
 }
 
 impl fmt::Display for Request {
@@ -172,6 +185,7 @@ fn number(value: f64) -> String {
 impl Gradient {
     fn table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "gradient length squared l^2 (length^2)")?;
+        let squared = |value: f64| number(value).trim_start().to_owned();
         let words = match self.effect {
             Effect::Stiffens => "positive: stiffens short waves, a second gradient",
             Effect::Softens => "negative: softens short waves, not a second gradient",
@@ -180,17 +194,18 @@ impl Gradient {
         row(
             f,
             "waves along x",
-            format_args!("{:.9} along, {:.9} across", self.longitudinal_x, self.transverse_x),
+            format_args!("{} along, {} across", squared(self.longitudinal_x), squared(self.transverse_x)),
         )?;
-        row(f, "over all directions", format_args!("{:.9} to {:.9}; {words}", self.least, self.greatest))
+        let ends = [self.least, self.greatest].map(squared);
+        row(f, "over all directions", format_args!("{} to {}; {words}", ends[0], ends[1]))
     }
 }
 
 impl Waves {
     fn table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "all waves")?;
-        let [x, y] = self.worst.map(settled);
-        let wave = format!("wave vector [{x:.4} {y:.4}], wavelength {:.4}", self.worst_length);
+        let ([x, y], [length]) = (lengths(self.worst, 4), lengths([self.worst_length], 4));
+        let wave = format!("wave vector [{x} {y}], wavelength {length}");
         if self.stable {
             row(f, "stable", "yes: every wave costs energy")?;
             row(f, "cheapest wave", format_args!("{wave}: {:.4} of what springs would cost", self.least))?;

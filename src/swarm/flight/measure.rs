@@ -143,13 +143,20 @@ impl Record {
         };
         self.farthest.push([affine.flatten(), rest.flatten(), continuum.flatten()]);
         self.samples.push(sample);
-        if (flight.fleet().period() as usize).is_multiple_of(self.every)
-            || flight.fleet().period() == flight.periods()
-        {
-            self.times.push(flight.fleet().time());
-            self.tracks.push(present);
+        let period = flight.fleet().period();
+        if (period as usize).is_multiple_of(self.every) || period == flight.periods() {
+            self.end(flight);
         }
         sample
+    }
+
+    /// Keeps the places of now, unless they are kept.
+    pub fn end(&mut self, flight: &Flight) {
+        let time = flight.fleet().time();
+        if self.times.last() != Some(&time) {
+            self.times.push(time);
+            self.tracks.push(flight.fleet().places());
+        }
     }
 }
 

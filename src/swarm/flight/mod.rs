@@ -171,6 +171,7 @@ pub fn fly_with_observer(
         flight.step_with_observer(hear);
         let sample = record.take(&flight, &before);
         if watch(&flight, &sample).is_break() {
+            record.end(&flight);
             break;
         }
     }
