@@ -37,6 +37,7 @@ fn unstepped(scene: &Scene, figures: &[(String, usize)]) -> Option<String> {
         ("update.order", raw.update.order != RawOrder::Synchronous),
         ("update.damping", raw.update.damping.is_some()),
         ("stop.tolerance", raw.stop.tolerance.is_some()),
+        ("record.probes", scene.is_solved_at_once() && !scene.record.probes.is_empty()),
     ];
     let of_update = of_update.into_iter().filter(|(_, is_given)| *is_given).map(|(key, _)| key.to_owned());
     let before = figures.iter().filter(|(_, at)| scene.is_solved_at_once() && *at < scene.stop.steps);

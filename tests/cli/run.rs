@@ -515,6 +515,8 @@ fn keys_of_steps_that_an_equilibrium_does_not_take_are_warned_of_by_the_plan_and
         assert!(said.contains(words), "{said}");
         assert!(command[0] == "run" || said.contains("a ParaView file of the equilibrium"), "{said}");
     }
+    let said = done(&["plan", "bar", "--set", "record.probes=[1]"], folder.path());
+    assert!(said.contains("solved for: record.probes; leave"), "{said}");
     assert!(!done(&["plan", "bar"], folder.path()).contains("without effect"));
 }
 
