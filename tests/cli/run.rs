@@ -472,6 +472,12 @@ fn a_plan_says_what_is_modelled_left_out_and_why() {
     assert!(said.contains("rule.poisson from step 21 on") && said.contains("  rule.feedback "), "{said}");
 }
 
+/// What `plan` and `run` say of a bundled scene with these arguments.
+fn said_by_plan_and_run(scene: &str, set: &[&str], folder: &Path) -> [String; 2] {
+    let run = ["run", scene, "--no-report", "--figures", "none", "--out", "o"];
+    [&["plan", scene][..], &run].map(|command| done(&[command, set].concat(), folder))
+}
+
 #[test]
 fn what_comes_after_the_last_step_is_warned_of_by_the_plan_and_the_run() {
     let folder = temporary();
@@ -485,12 +491,9 @@ fn what_comes_after_the_last_step_is_warned_of_by_the_plan_and_the_run() {
     let set: Vec<&str> = set.iter().flat_map(|text| ["--set", *text]).collect();
     let words = "caution: beyond the last step, 25, and without effect: roles[1].from = 99999, actions[1].at = 2000, \
                  record.figures[2] = 26, record.figures[3] = 100000; lower them, or raise stop.steps\n";
-    for command in
-        [&["plan", "tension"][..], &["run", "tension", "--no-report", "--figures", "none", "--out", "o"]]
-    {
-        let said = done(&[command, &set].concat(), folder.path());
-        assert!(said.contains(words), "{said}");
-    }
+    said_by_plan_and_run("tension", &set, folder.path())
+        .iter()
+        .for_each(|said| assert!(said.contains(words), "{said}"));
     let parts = ["--set", "load_steps={ increments = 4 }", "--set", "record.figures=[4, 5]"];
     let said = done(&[&["plan", "elastica"][..], &parts].concat(), folder.path());
     assert!(
@@ -510,11 +513,9 @@ fn keys_of_steps_that_an_equilibrium_does_not_take_are_warned_of_by_the_plan_and
     let set: Vec<&str> = set.iter().flat_map(|text| ["--set", *text]).collect();
     let words = "caution: without effect on an equilibrium that is solved for: update.order, update.damping, stop.tolerance, \
                  record.figures[0] = 3; leave [equilibrium] out to step\n";
-    for command in [&["plan", "bar"][..], &["run", "bar", "--no-report", "--figures", "none", "--out", "o"]] {
-        let said = done(&[command, &set].concat(), folder.path());
-        assert!(said.contains(words), "{said}");
-        assert!(command[0] == "run" || said.contains("a ParaView file of the equilibrium"), "{said}");
-    }
+    let said = said_by_plan_and_run("bar", &set, folder.path());
+    said.iter().for_each(|said| assert!(said.contains(words), "{said}"));
+    assert!(said[0].contains("a ParaView file of the equilibrium"), "{}", said[0]);
     let said = done(&["plan", "bar", "--set", "record.probes=[1]"], folder.path());
     assert!(said.contains("solved for: record.probes; leave"), "{said}");
     assert!(!done(&["plan", "bar"], folder.path()).contains("without effect"));
@@ -530,11 +531,9 @@ fn cuts_that_miss_the_body_are_warned_of_by_the_plan_and_the_run() {
          { at = 3, what = { kind = \"cut\", from = [90.0, 90.0], to = [91.0, 91.0] } }]",
     ];
     let set: Vec<&str> = set.iter().flat_map(|text| ["--set", *text]).collect();
-    let run = ["run", "tension", "--no-report", "--figures", "none", "--out", "o"];
     let unless = "the cut of actions[1] where the body begins: without effect unless the body has moved there by step 3\n";
     let idle = "no bond crosses the cut of actions[1], which is without effect: lay it through the body\n";
-    for (command, of_action) in [(&["plan", "tension"][..], unless), (&run[..], idle)] {
-        let said = done(&[command, &set].concat(), folder.path());
+    for (said, of_action) in said_by_plan_and_run("tension", &set, folder.path()).iter().zip([unless, idle]) {
         assert!(said.contains("caution: no bond crosses cuts[1], which is without effect"), "{said}");
         assert!(said.contains(of_action), "{said}");
         let cautions = said.lines().filter(|line| line.starts_with("caution"));
