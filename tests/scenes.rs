@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use flockform::continuum::bulk_response::material;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::report::PlanReport;
 use flockform::continuum::run::{Outcome, StopReason, run};
@@ -269,6 +270,57 @@ fn a_material_whose_cells_lock_in_shear_is_a_caution() {
     assert!(!is_cautioned("-0.7") && !is_cautioned("-0.9; plane = 'strain'"));
 }
 
+/// Off their axis a cantilever of whole cells bends by three quarters of what it should with fibres 14 times as stiff, by the truth of
+/// `compare`; along it by all of it.
+#[test]
+fn fibres_across_the_sides_of_cells_are_a_caution() {
+    let is_cautioned = |fibres: &str, lattice: &str| {
+        let text = format!(
+            "title = 'ply'\nlattice = {{ {lattice} }}\nbody.shape = {{ kind = 'rectangle', max = [8.0, 4.0] }}\n\
+             rule.mean.kind = 'material'\nmaterial = {{ kind = 'orthotropic', poisson_12 = 0.3, {fibres} }}\n\
+             roles = [{{ region = {{ kind = 'edge', side = 'left' }}, role = 'clamped' }}]\n\
+             loads = [{{ kind = 'traction', region = {{ kind = 'edge', side = 'right' }}, traction = [0.0, 0.001] }}]\n\
+             equilibrium = {{}}\nstop.steps = 1"
+        );
+        let scene =
+            Scene::parse("ply", "ply.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+        PlanReport::new(&scene, &planned(&scene)).expect("planned").cautions.join("\n").contains("fibres")
+    };
+    let ply = |angle: f64| format!("young = [140.0, 10.0], shear = 5.0, angle = {angle:?}");
+    let square = |turn: f64| format!("kind = 'square', spacing = 1.0, orientation = {turn:?}");
+    assert!(is_cautioned(&ply(30.0), &square(0.0)) && is_cautioned(&ply(0.0), &square(30.0)));
+    assert!(is_cautioned(&ply(0.0), "kind = 'hexagonal', spacing = 1.0"));
+    for angle in [0.0, 90.0, -90.0] {
+        assert!(!is_cautioned(&ply(angle), &square(0.0)), "{angle}");
+    }
+    assert!(!is_cautioned(&ply(30.0), &square(30.0)) && !is_cautioned(&ply(30.0), &square(-60.0)));
+    assert!(!is_cautioned("young = [9.0, 5.0], shear = 2.0, angle = 30.0", &square(0.0)));
+}
+
+#[test]
+fn whole_cells_of_a_grid_are_cautioned_as_those_of_a_rectangle() {
+    let cautions = |shape: &str| {
+        let text = format!(
+            "title = 'grid'\nlattice = {{ kind = 'square', spacing = 1.0 }}\nbody = {{ {shape} }}\nrule.mean.kind = 'material'\n\
+             material = {{ kind = 'isotropic', young = 1.0, poisson = 0.3 }}\nequilibrium = {{}}\nstop.steps = 1\n\
+             roles = [{{ region = {{ kind = 'edge', side = 'left' }}, role = 'clamped' }},\n{{ region = {{ kind = 'edge', side = 'right' }}, \
+             role = 'leader', motion = {{ kind = 'keyframes', frames = [{{ step = 1, displacement = [0.1, 0.0] }}] }} }}]"
+        );
+        let scene =
+            Scene::parse("grid", "grid.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+        let cautions = PlanReport::new(&scene, &planned(&scene)).expect("planned").cautions;
+        ["along the edges", "one or two cells thick"]
+            .map(|words| cautions.iter().any(|one| one.contains(words)))
+    };
+    assert_eq!(cautions("shape = { kind = 'grid', columns = 21, rows = 3 }"), [true, true]);
+    assert_eq!(cautions("shape = { kind = 'grid', columns = 21, rows = 5 }"), [true, false]);
+    let rectangle = |height: f64| {
+        format!("outline = 'lattice', shape = {{ kind = 'rectangle', max = [20.0, {height:?}] }}")
+    };
+    assert_eq!(cautions(&rectangle(2.0)), [true, true]);
+    assert_eq!(cautions(&rectangle(4.0)), [true, false]);
+}
+
 /// The lowest row and its particles' neighbours below zero.
 fn negative(world: &str) -> String {
     format!(
@@ -353,6 +405,36 @@ fn weights_that_grow_with_distance_settle_only_sequentially_or_damped() {
     let damped = between("update={damping=0.5}");
     assert_eq!(damped.reason, StopReason::Equilibrium);
     assert!((damped.engine.present().x[1] - 2.0).abs() < 1e-6);
+}
+
+/// The largest eigenvalue of `d^p (1 + p n n')` over the sum of `d^p` on a square lattice is `2 + p`, of a wave along its bonds.
+#[test]
+fn weights_by_distance_settle_below_the_damping_that_is_said_and_not_above() {
+    for power in [1.0, 2.0, 3.0] {
+        let limit = 2.0 / (2.0 + power);
+        let set = |damping: f64| {
+            [
+                format!("rule.mean={{kind=\"distance\",power={power:?}}}"),
+                format!("update.damping={damping:?}"),
+                "stop={steps=3000,tolerance=1e-9}".to_owned(),
+            ]
+        };
+        let of = |damping: f64| {
+            let set = set(damping);
+            let scene = load("distance-weights", &set.each_ref().map(String::as_str));
+            let cautions = PlanReport::new(&scene, &planned(&scene)).expect("planned").cautions.join("\n");
+            (cautions.contains(&format!("damped below {limit:.4}")), run_out(&scene).reason, material(&scene))
+        };
+        let (is_cautioned, reason, report) = of(0.95 * limit);
+        assert!(!is_cautioned && reason == StopReason::Equilibrium, "{power}: {reason:?}");
+        let found = report.expect("a material").waves.damping_limit.expect("stable");
+        assert!((found / limit - 1.0).abs() < 1e-9, "{power}: {found}");
+        let (is_cautioned, reason, _) = of(1.06 * limit);
+        assert!(is_cautioned && reason == StopReason::Steps, "{power}: {reason:?}");
+    }
+    let scene = load("distance-weights", &["rule.mean={kind=\"distance\",power=-2.0}"]);
+    let cautions = PlanReport::new(&scene, &planned(&scene)).expect("planned").cautions.join("\n");
+    assert!(cautions.contains("unstable") && cautions.contains("greater rule.mean.power"), "{cautions}");
 }
 
 #[test]

@@ -182,6 +182,9 @@ impl Sweep {
         if let Some(name) = arguments.plot.as_deref().filter(|name| !table.has_numbers(name)) {
             note!("caution: `{name}` is a number in no run, so that there is nothing to draw");
         }
+        if let Some(caution) = self.ids_elsewhere() {
+            note!("caution: {caution}");
+        }
         write_sweep(&folder, &table, arguments.figures.figures, arguments.plot.as_deref())?;
         let json = arguments.json.then(|| table.json());
         let kept = interrupt::commit(folder)?;
@@ -199,6 +202,19 @@ impl Sweep {
         }
         let is_refused = self.rows.values().any(|row| row.stop_reason == runs::REFUSED);
         Ok(exit_code(!is_refused))
+    }
+
+    /// Names what asks for particles by ids where a varied key gives those to others.
+    fn ids_elsewhere(&self) -> Option<String> {
+        let lays_out =
+            |key: &&str| ["lattice", "body"].contains(&key.split(['.', '[']).next().unwrap_or(key));
+        let key = self.design.factors.iter().map(|factor| factor.key.as_str()).find(lays_out)?;
+        let probe = self.request().outputs.iter().find(|name| name.starts_with("probe.")).cloned();
+        let name = probe.or_else(|| self.scene.picks_by_ids())?;
+        Some(format!(
+            "`{key}` lays the particles out anew, and an id, as `{name}` has, is then another one's: ask for places (record.places), \
+             and pick regions by place"
+        ))
     }
 
     /// `20 runs, all ended at stop.steps`, or `20 runs: 18 ended at stop.steps, 2 diverged`.

@@ -1,6 +1,7 @@
 //! The rule of an interior particle of a scene, as on an infinite lattice: what its waves say about the
 //! scene before it runs, and what material it is.
 
+use crate::flock::block::Block;
 use crate::flock::lattice::Site;
 use crate::flock::neighbourhood::Neighbourhood;
 use crate::flock::rules::{FeedbackReference, Mean};
@@ -38,19 +39,13 @@ fn undamped(scene: &Scene) -> Result<MaterialReport, SceneError> {
         return Err(scene.refuse("body.shape", message, help));
     }
     check_homogeneous(scene)?;
-    let (scalar, name) = (scalar_crystal(scene)?, rule_name(scene));
-    let (crystal, at_rest) = match scene.mean {
-        Mean::Distance { power } => (linearised(&scalar, power), true),
-        _ => (scalar, false),
-    };
-    let mut report = MaterialReport::of_rule(&scene.lattice, name, &crystal)
+    let (crystal, divisors) = about_rest(scene)?;
+    let mut report = MaterialReport::of_rule_over(&scene.lattice, rule_name(scene), &crystal, &divisors)
         .map_err(|error| scene.refuse("neighbours", error.to_string(), remedy(&error)))?;
     if let Some(Weights::Gradient { length }) = scene.weights {
         report.notes.push(layer_note(length));
     }
-    if at_rest {
-        // Its update divides by the sum of the weights, not by that of their derivatives.
-        report.waves.damping_limit = None;
+    if matches!(scene.mean, Mean::Distance { .. }) {
         report.notes.push(
             "weights that depend on the present distance are taken for small displacements about rest, K = d^p (1 + p n n')"
                 .into(),
@@ -136,14 +131,25 @@ fn scalar_crystal(scene: &Scene) -> Result<Crystal, SceneError> {
         .map_err(|error| scene.refuse("rule.weights", error.to_string(), remedy(&error)))
 }
 
+/// The rule for small displacements about rest, and what its update divides by on each sublattice.
+fn about_rest(scene: &Scene) -> Result<(Crystal, Vec<Block>), SceneError> {
+    let scalar = scalar_crystal(scene)?;
+    let (weighted, crystal) = match scene.mean {
+        Mean::Distance { power } => (linearised(&scalar, power, 0.0), linearised(&scalar, power, power)),
+        _ => (scalar.clone(), scalar),
+    };
+    let divisors = (0..weighted.bonds.len()).map(|s| weighted.diagonal(s)).collect();
+    Ok((crystal, divisors))
+}
+
 /// Weights `d^p` of the present distance `d`, for small displacements about rest: their derivative adds
-/// a pull along the bond, `K = d^p (1 + p n n')`.
-fn linearised(crystal: &Crystal, power: f64) -> Crystal {
+/// a pull along the bond, `K = d^p (1 + p n n')`; the rule divides by the sum of the weights, without `along`.
+fn linearised(crystal: &Crystal, power: f64, along: f64) -> Crystal {
     let linear = |bond: &Bond| {
         let [x, y] = bond.vector;
         let distance = x.hypot(y);
         let ([nx, ny], size) = ([x / distance, y / distance], distance.powf(power) * bond.block[0][0]);
-        let along = size * power;
+        let along = size * along;
         let block = [[size + along * nx * nx, along * nx * ny], [along * nx * ny, size + along * ny * ny]];
         Bond { block, ..*bond }
     };
@@ -205,23 +211,36 @@ pub(super) fn require_damped(scene: &Scene, gradient: &GradientWeights) -> Resul
 }
 
 /// Warnings about a run from the waves of the scene's fixed weights.
-pub(super) fn cautions(scene: &Scene) -> Vec<String> {
+pub(crate) fn cautions(scene: &Scene) -> Vec<String> {
     // Rules that have no waves (not symmetric, say) are no error here.
     let Some((crystal, zone)) = waves_in_doubt(scene) else { return Vec::new() };
+    let by_distance = matches!(scene.mean, Mean::Distance { .. });
     let gradient = matches!(scene.weights, Some(Weights::Gradient { .. }));
     let (damping, over) = (scene.update.damping, scene.over_relaxation());
     if !zone.stable || crystal.effective() == Err(HomogeniseError::NoStiffness) {
         let length = std::f64::consts::TAU / zone.worst[0].hypot(zone.worst[1]);
         return vec![format!(
             "these weights are unstable: a wave of length {length:.4} {} costs nothing or gives energy and does not die out in any update; \
-             weights of far neighbours are too negative (on a chain, w2 must be above -w1/4)",
-            scene.unit()
+             {}",
+            scene.unit(),
+            if by_distance {
+                "they fall with the distance too fast: use a greater rule.mean.power"
+            } else {
+                "weights of far neighbours are too negative (on a chain, w2 must be above -w1/4)"
+            }
         )];
     }
-    if scene.update.order == Order::Synchronous && damping * over > zone.damping_limit * (1.0 + 1e-9) {
+    let limit = zone.damping_limit / over;
+    if by_distance && scene.update.order == Order::Synchronous && damping > limit * (1.0 - 1e-9) {
+        return vec![format!(
+            "weights that grow with distance let the shortest waves of a synchronous update grow unless it is damped below {limit:.4}: \
+             what is moved does not settle; lower update.damping or use update.order = \"sequential\""
+        )];
+    }
+    if scene.update.order == Order::Synchronous && damping > limit * (1.0 + 1e-9) {
         return vec![format!(
             "a synchronous update of these weights diverges unless damped below {:.4}: set update.damping or use update.order = \"sequential\"",
-            zone.damping_limit / over
+            limit
         )];
     }
     if gradient && scene.update.order == Order::Synchronous && damping * over >= SAFE_DAMPING {
@@ -239,16 +258,18 @@ pub(super) fn cautions(scene: &Scene) -> Vec<String> {
 fn waves_in_doubt(scene: &Scene) -> Option<(Crystal, Zone)> {
     let is_of_lattice =
         !scene.is_of_points() && !matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. });
-    if scene.mean != Mean::Barycentre || !is_of_lattice {
+    let by_distance = matches!(scene.mean, Mean::Distance { .. });
+    if (scene.mean != Mean::Barycentre && !by_distance) || !is_of_lattice {
         return None;
     }
-    let crystal = scalar_crystal(scene).ok()?;
+    let (crystal, divisors) = about_rest(scene).ok()?;
     let positive = crystal.bonds.iter().flatten().all(|bond| bond.block[0][0] >= 0.0);
     if positive
+        && !by_distance
         && (scene.update.order == Order::Sequential || scene.update.damping * scene.over_relaxation() <= 1.0)
     {
         return None;
     }
-    let zone = crystal.zone().ok()?;
+    let zone = crystal.zone_over(&divisors).ok()?;
     Some((crystal, zone))
 }

@@ -6,7 +6,7 @@ use crate::engine::Engine;
 use crate::engine::setup::Setup;
 use crate::flock::body::Body;
 use crate::flock::fracture::{Ghosts, Threshold};
-use crate::flock::lattice::LatticeKind;
+use crate::flock::lattice::{Lattice, LatticeKind};
 use crate::flock::law::Flock;
 use crate::flock::role::Role;
 use crate::flock::vectors::{Vectors, distance};
@@ -72,16 +72,33 @@ fn sees(flock: &Flock, from: usize, other: usize) -> bool {
     flock.neighbours.of(from).contains(&(other as u32))
 }
 
-/// Names a material that resists shear so much more than dilatation that its cells lock.
-fn locking(scene: &Scene) -> Option<String> {
+/// Names materials that resist one strain so much more than another that their cells lock.
+fn locking(scene: &Scene) -> impl Iterator<Item = String> {
     let inclusions = scene.inclusions.iter().map(|part| &part.material);
-    let mut all = scene.material.iter().chain(inclusions);
-    all.any(Elastic::locks_in_shear).then(|| {
+    let all = scene.material.iter().chain(inclusions);
+    let fibres: Vec<Option<f64>> = all.filter(|elastic| elastic.locks()).map(Elastic::fibres).collect();
+    let in_shear = fibres.contains(&None).then(|| {
         "near poisson = -1 in plane stress a material resists shear far more than dilatation, and its cells lock: \
          the body is too stiff, pulled by 10 % at -0.9 with 4 cells across, and by 14 % at -0.99 with 16; use a smaller \
          spacing, and see `flockform compare`"
             .into()
-    })
+    });
+    let along_fibres = fibres.iter().flatten().any(|&angle| !lies_along(&scene.lattice, angle)).then(|| {
+        "with fibres a material resists one strain far more than another, and cells whose sides do not lie along them lock: the \
+         body is too stiff (on a honeycomb perhaps too soft), bent by 23 % with fibres 14 times as stiff at 30 degrees and 4 cells \
+         across, by 7 % with 8, and more with stiffer fibres; use a square lattice with lattice.orientation along the fibres, or a \
+         smaller spacing, and see `flockform compare`"
+            .into()
+    });
+    in_shear.into_iter().chain(along_fibres)
+}
+
+/// Whether cells are rectangles with sides along this angle from x \[rad\].
+fn lies_along(lattice: &Lattice, angle: f64) -> bool {
+    let [x, y] = lattice.vector([1, 0]);
+    let are_rectangles =
+        matches!(lattice.kind(), LatticeKind::Square { .. } | LatticeKind::Rectangular { .. });
+    are_rectangles && (2.0 * (y.atan2(x) - angle)).sin().abs() < 1e-6
 }
 
 /// Says that ghosts are not mirrored where no neighbour lies opposite.
@@ -113,7 +130,7 @@ fn framed_probes(scene: &Scene, body: &Body, any: impl Fn(bool) -> bool) -> Opti
 /// The warnings before a run.
 pub(crate) fn planned(scene: &Scene, setup: &Setup) -> Vec<String> {
     let Setup { body, flock, roles, changes, .. } = setup;
-    let mut cautions: Vec<String> = locking(scene).into_iter().chain(unmirrored(scene)).collect();
+    let mut cautions: Vec<String> = locking(scene).chain(unmirrored(scene)).collect();
     // A part does not see the others.
     if body.part.is_some() {
         return cautions;
@@ -131,7 +148,7 @@ pub(crate) fn seen(scene: &Scene, engine: &Engine) -> Vec<String> {
         Doubts::of(engine.body(), engine.flock(), engine.roles(), engine.present());
     let [followers, unmoved, long] = [followers, unmoved, long].map(|own| engine.count_of_parts(own));
     let mut cautions = Doubts { followers, unmoved, long }.cautions(scene);
-    cautions.extend(locking(scene).into_iter().chain(unmirrored(scene)));
+    cautions.extend(locking(scene).chain(unmirrored(scene)));
     cautions.extend(layout::roles::cautions(engine.changes(), engine.body(), engine.parted()));
     cautions.extend(framed_probes(scene, engine.body(), |own| engine.any_of_parts(own)));
     cautions

@@ -10,6 +10,7 @@ use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
+use super::report::THIN;
 use crate::engine::actions::Stressed;
 use crate::flock::body::Body;
 use crate::flock::rules::Rotation;
@@ -25,9 +26,6 @@ use crate::scene::text::counted;
 
 /// Steps of a line of sight \[spacings\].
 const SIGHT: f64 = 0.25;
-
-/// Thickness across an edge up to which bending does not show \[spacings\]: that of two cells, and a bit.
-const THIN: f64 = 2.6;
 
 /// Cosine of the angle between the outward normals of two sides of a thin body: at least 135 degrees.
 const OPPOSITE: f64 = -0.7;

@@ -21,7 +21,7 @@ use crate::flock::rules::{Mean, Rotation};
 use crate::geometry::point::area;
 use crate::material::outline_loads::Resultant;
 use crate::scene::document::{find, split_assignment};
-use crate::scene::raw::{RawAction, RawActionKind, RawLoad};
+use crate::scene::raw::{RawAction, RawActionKind, RawLoad, RawShape};
 use crate::scene::text::{counted, percent};
 use crate::scene::{LoadSteps, Scene, SceneError, Weights as SceneWeights};
 use crate::sweep::{Order, Sweep};
@@ -276,7 +276,7 @@ fn facts(
 }
 
 /// Parts of the shape's area, and of its size, beyond which a body that differs from it is worth a caution.
-const DEVIATES: f64 = 0.01;
+pub(crate) const DEVIATES: f64 = 0.01;
 
 /// Pieces of an outline that are listed.
 const MOST_PIECES: usize = 16;
@@ -321,14 +321,6 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
     }
     let rule = plan.setup.flock.rule;
     let is_synchronous = plan.setup.update.order == Order::Synchronous;
-    let undamped = is_synchronous && plan.setup.update.damping == 1.0;
-    if undamped && matches!(rule.mean, Mean::Distance { power } if power > 0.0) {
-        cautions.push(
-            "weights that grow with distance are marginal in a synchronous update: large deformations do not settle; \
-             use update.order = \"sequential\" or update.damping = 0.5"
-                .into(),
-        );
-    }
     if plan.setup.present_radius.is_some() && rule.mean == Mean::Barycentre {
         cautions.push(
             "the barycentre of all particles in range keeps no distance: the body contracts; use rule.mean.kind = \"spaced\"".into(),
@@ -372,14 +364,33 @@ pub(crate) fn dead_pressure(scene: &Scene) -> Option<String> {
     })
 }
 
-/// The warning about stress along edges that could follow the outline and do not, if there is one.
-pub(crate) fn whole_cells(scene: &Scene) -> Option<String> {
-    let is_material = matches!(scene.mean, Mean::Material { .. });
-    (scene.raw.body.shape.has_outline() && is_material && !scene.is_fitted).then(|| {
+/// Cells across a body up to which bending does not show, and a bit \[1\].
+pub(super) const THIN: f64 = 2.6;
+
+/// The warnings about stress in a body of whole cells, whose edges could follow an outline and do not.
+pub(crate) fn whole_cells(scene: &Scene) -> Vec<String> {
+    if !matches!(scene.mean, Mean::Material { .. }) || scene.is_fitted {
+        return Vec::new();
+    }
+    let (remedy, across) = match scene.raw.body.shape {
+        RawShape::Grid { columns, rows } => {
+            ("give the shape as a rectangle, without body.outline", Some(f64::from(columns.min(rows)) - 1.0))
+        }
+        RawShape::Rectangle { min: [left, bottom], max: [right, top] } => {
+            ("leave body.outline out", Some((right - left).min(top - bottom) / scene.lattice.spacing()))
+        }
+        _ => ("leave body.outline out", None),
+    };
+    let of_edges = format!(
         "stress is not recovered along the edges of a body of whole cells: there it is the mean of a particle's cells, half a \
-         cell within the body; leave body.outline out"
+         cell within the body; {remedy}"
+    );
+    let of_bending = across.filter(|&across| across <= THIN).map(|_| {
+        "the body is one or two cells thick: a cell has one stress, so that of bending across the thickness does not show; use a \
+         smaller spacing (four cells and more)"
             .to_owned()
-    })
+    });
+    [Some(of_edges), of_bending].into_iter().flatten().collect()
 }
 
 impl fmt::Display for PlanReport {

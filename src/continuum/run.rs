@@ -308,7 +308,7 @@ fn cause_in_sweep(engine: &Engine) -> Option<String> {
         });
     }
     if matches!(rule.mean, Mean::Distance { power } if power > 0.0) && is_synchronous {
-        return Some("weights that grow with distance are marginal in a synchronous update; use update.order = \"sequential\" or update.damping = 0.5".into());
+        return Some("weights that grow with distance let the shortest waves of a synchronous update grow; use update.order = \"sequential\" or a smaller update.damping (`flockform material` computes the limit)".into());
     }
     let are_of_both_signs = matches!(&engine.flock().weights, Weights::Scalar(weights) if weights.iter().any(|weight| *weight < 0.0));
     let are_of_both_signs = engine.count_of_parts(usize::from(are_of_both_signs)) > 0;

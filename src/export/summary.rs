@@ -9,21 +9,25 @@ use serde::{Serialize, Serializer};
 
 use super::error::{ExportError, write_file};
 use super::{OutputFolder, bonds, largest_strain};
+use crate::continuum::bulk_response;
 use crate::continuum::cuts;
 use crate::continuum::doubts;
 use crate::continuum::late;
 use crate::continuum::layout::regions::uneven_sides;
 use crate::continuum::mechanics::{Mechanics, Peak, Stresses, percent};
 use crate::continuum::places::{AtPlace, at_places};
-use crate::continuum::report::{dead_pressure, whole_cells};
+use crate::continuum::report::{DEVIATES, dead_pressure, whole_cells};
 use crate::continuum::run::{Outcome, StopReason};
 use crate::engine::Engine;
 use crate::engine::forces::Reaction;
+use crate::flock::body::Cut;
 use crate::flock::role::Role;
 use crate::flock::rules::Rotation;
-use crate::scene::Scene;
+use crate::geometry::outline::Outline;
+use crate::geometry::point::area;
 use crate::scene::raw::RawScene;
 use crate::scene::units::Units;
+use crate::scene::{BodySource, Scene};
 use crate::solve::equilibrium::Solved;
 
 pub(super) const PROGRAM: &str = env!("CARGO_PKG_NAME");
@@ -291,17 +295,40 @@ fn cautions(scene: &Scene, engine: &Engine, measured: Option<&Measured>) -> Vec<
     let of_forces = |measured: &Measured| {
         dead_pressure(scene)
             .into_iter()
+            .chain(off_the_shape(scene, engine))
             .chain(whole_cells(scene))
             .chain(measured.mechanics.cautions(engine))
             .collect::<Vec<_>>()
     };
     uneven_sides(scene)
         .into_iter()
+        .chain(bulk_response::cautions(scene))
         .chain(late::cautions(scene))
         .chain(doubts::seen(scene, engine))
         .chain(cuts::made(scene, engine))
         .chain(measured.map(of_forces).into_iter().flatten())
         .collect()
+}
+
+/// Names a body of whole cells whose area is not its shape's; found by all ranks together.
+fn off_the_shape(scene: &Scene, engine: &Engine) -> Option<String> {
+    let BodySource::Cut(Cut::Shape(shape)) = &scene.body else { return None };
+    let cells = engine.cells().filter(|_| !scene.is_fitted)?;
+    let whole = Outline::of_shape(shape).ok()?.area();
+    let areas: Vec<f64> = cells.shapes.iter().map(area).collect();
+    let (body, count) = (engine.body(), cells.count_whole());
+    let own = cells
+        .owned(body)
+        .into_iter()
+        .flatten()
+        .map(|cell| (body.cell_after_all(cell, count), [areas[cells.kind[cell] as usize]]));
+    let off = engine.sum_of_parts([-0.0], own)[0] / whole - 1.0;
+    (off.abs() > DEVIATES).then(|| {
+        format!(
+            "the body is not the shape: its area is {:+.2} % off; use body.outline = \"fitted\" or a smaller spacing",
+            100.0 * off
+        )
+    })
 }
 
 /// Whether feedback holds particles by more than their material.

@@ -109,7 +109,7 @@ impl Body {
             || !self.history.now.scene.actions.iter().all(Action::is_cut)
             || self.history.now.is_untouched()
         {
-            return self.history.restart(&[text.to_owned()]);
+            return self.restart_with(text);
         }
         self.history.now.require_room(0)?;
         let changed: Vec<String> = self.history.now.changed_keys().chain([text.to_owned()]).collect();
@@ -121,13 +121,18 @@ impl Body {
         }
         let Ok(conduct) = plan(&scene)?.conduct_of(&self.history.now.setup) else {
             // Another body: from the start, then.
-            return self.history.restart(&[text.to_owned()]);
+            return self.restart_with(text);
         };
         self.history.keep();
         let at = self.history.now.engine.step() + 1;
         self.history.now.engine.perform(&ActionKind::Follow(Arc::new(conduct)), at);
         self.history.now.keep_key(at, text);
         Ok(())
+    }
+
+    /// Begins anew with one more key set, besides those that were changed on the way.
+    fn restart_with(&mut self, text: &str) -> Result<(), Refused> {
+        self.history.restart([self.sets(), vec![text.to_owned()]].concat())
     }
 
     /// Whether it has bonds that can be cut.

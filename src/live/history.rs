@@ -89,7 +89,7 @@ impl<S: State> History<S> {
     pub(super) fn perform(&mut self, command: &Command) -> Result<(), Refused> {
         match command {
             Command::Undo {} => self.undo(),
-            Command::Reset {} => self.restart(&[]),
+            Command::Reset {} => self.restart(self.set.clone()),
             _ => Err(format!("a {} cannot do this", S::NAME).into()),
         }
     }
@@ -129,12 +129,12 @@ impl<S: State> History<S> {
         Ok(())
     }
 
-    /// Begins anew, with more keys set.
+    /// Begins anew, with these keys set.
     ///
     /// # Errors
     /// As [`State::begin`]; nothing has changed then.
-    pub(super) fn restart(&mut self, more: &[String]) -> Result<(), Refused> {
-        self.begin(Arc::clone(&self.source), [&self.set[..], more].concat())
+    pub(super) fn restart(&mut self, set: Vec<String>) -> Result<(), Refused> {
+        self.begin(Arc::clone(&self.source), set)
     }
 
     /// Begins anew with another file.

@@ -227,7 +227,14 @@ impl Session for Swarm {
             Command::Set { key, value } if CHANNEL_KEYS.contains(&key.trim()) => {
                 self.channel(key.trim(), value)
             }
-            Command::Set { key, value } => self.history.restart(&[format!("{key}={value}")]),
+            Command::Set { key, value } => {
+                // What the file makes of the channel on its way it does again.
+                let is_channel =
+                    |command: &RawCommand| matches!(command.what, RawCommandKind::Channel { .. });
+                let by_hand = self.history.now.commands.iter().any(is_channel);
+                let sets = if by_hand { self.sets() } else { self.history.set().to_vec() };
+                self.history.restart([sets, vec![format!("{key}={value}")]].concat())
+            }
             Command::Fault { robot, what } => self.fault(*robot, *what),
             Command::Design { edit } => self.design(edit),
             other => self.history.perform(other),

@@ -53,8 +53,9 @@ pub enum Constants {
 /// 2/3 is as much: Lame's lambda over the shear modulus is the same.
 const LOCKS_ABOVE: f64 = 0.4;
 
-/// Poisson's ratio in plane stress below which cells are cautioned against: see [`Elastic::locks_in_shear`].
-const LOCKS_BELOW: f64 = -0.8;
+/// Stiffness of cells against one strain over that against another beyond which they are cautioned against: see
+/// [`Elastic::locks`]. At nu = -0.8 in plane stress it is as much.
+const LOCKS_BEYOND: f64 = 9.0 * (1.0 + 1e-9);
 
 /// Why constants make no stable material.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -104,6 +105,12 @@ pub enum ElasticError {
     /// The entries of the stiffness over- or underflow.
     #[error("the stiffness of the sheet does not fit a double: the constants are too large or too small")]
     Range,
+}
+
+/// The components of a stiffness that change with the axes as those of a tensor do: shear by the root of two.
+pub(super) fn mandel(stiffness: &Voigt) -> Matrix3<f64> {
+    let weight = |i: usize| if i == 2 { 2f64.sqrt() } else { 1.0 };
+    Matrix3::from_fn(|i, j| stiffness[(i, j)] * weight(i) * weight(j))
 }
 
 /// A sheet: admissible constants and a thickness \[length\].
@@ -193,10 +200,19 @@ impl Elastic {
         }
     }
 
-    /// Whether it resists shear so much more than dilatation that cells lock: near nu = -1 in plane stress. In plane
-    /// strain the two stay comparable.
-    pub fn locks_in_shear(&self) -> bool {
-        matches!(self.constants, Constants::Isotropic { poisson, plane: Plane::Stress, .. } if poisson < LOCKS_BELOW)
+    /// Whether its cells resist one strain so much more than another that they lock: near nu = -1 in plane stress, and with
+    /// fibres that do not lie along their sides.
+    pub fn locks(&self) -> bool {
+        let cells = mandel(&self.stiffness_of_cells()).symmetric_eigenvalues();
+        cells.max() > LOCKS_BEYOND * cells.min()
+    }
+
+    /// The angle of its fibres from x, counter-clockwise \[rad\].
+    pub fn fibres(&self) -> Option<f64> {
+        match self.constants {
+            Constants::Orthotropic { angle, .. } => Some(angle),
+            Constants::Isotropic { .. } => None,
+        }
     }
 
     /// The stiffness less what resists dilatation by [`Elastic::averaged_dilatation`] \[force / length\]: all of it where

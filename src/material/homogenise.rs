@@ -19,11 +19,11 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Complex, DMatrix, Matrix2, Matrix3, Vector2};
+use nalgebra::{Complex, DMatrix, Matrix2, Matrix3, Vector2, Vector3};
 
 use super::Block;
 use super::cells::{Cells, templates};
-use super::elastic::{Elastic, Voigt};
+use super::elastic::{Elastic, Voigt, mandel};
 use super::stiffness::ShapeError;
 use super::weights::{WeightsError, bonds_of};
 use crate::flock::lattice::{Lattice, Site, ring};
@@ -133,11 +133,13 @@ impl Effective {
         self.lambda / (self.lambda + 2.0 * self.mu)
     }
 
-    /// Poisson's ratio of the nearest isotropic slice in plane strain \[1\]; none where the sheet
+    /// Poisson's ratio of the nearest isotropic slice in plane strain \[1\]; none where that is -1 or less, or the sheet
     /// resists an equal stretch with nothing or less (no solid does so).
     pub fn poisson_plane_strain(&self) -> Option<f64> {
+        let is_of_solid = |bulk: f64| bulk > 1e-12 * self.mu.abs();
         let bulk = self.lambda + self.mu;
-        (bulk > 1e-12 * self.mu.abs()).then(|| self.lambda / (2.0 * bulk))
+        (is_of_solid(bulk) && is_of_solid(3.0 * self.lambda + 2.0 * self.mu))
+            .then(|| self.lambda / (2.0 * bulk))
     }
 
     /// Young's modulus times thickness in plane stress \[force / length\], up to scale for a scalar rule;
@@ -243,7 +245,7 @@ impl Crystal {
         let lambda = bulk - mu;
         let direct = lambda + 2.0 * mu;
         let isotropic = Matrix3::new(direct, lambda, 0.0, lambda, direct, 0.0, 0.0, 0.0, mu);
-        let anisotropy = invariant_norm(&(stiffness - isotropic)) / invariant_norm(&stiffness);
+        let anisotropy = mandel(&(stiffness - isotropic)).norm() / mandel(&stiffness).norm();
         Ok(Effective { stiffness, lambda, mu, anisotropy, misfit, gradient: self.gradient_length()? })
     }
 
@@ -407,16 +409,10 @@ fn fit_stiffness(xx: &Matrix2<f64>, yy: &Matrix2<f64>, xy: &Matrix2<f64>) -> (Vo
     let c23 = 0.5 * (yy[(0, 1)] + xy[(1, 1)]);
     let c12 = 2.0 * xy[(0, 1)] - c33;
     let stiffness = Matrix3::new(xx[(0, 0)], c12, c13, c12, yy[(1, 1)], c23, c13, c23, c33);
-    let gap = Vector2::new(xx[(1, 1)] - yy[(0, 0)], 0.0).norm()
-        + (xx[(0, 1)] - xy[(0, 0)]).abs()
-        + (yy[(0, 1)] - xy[(1, 1)]).abs();
-    (stiffness, gap / (xx.norm() + yy.norm()))
-}
-
-/// Norm of a stiffness that does not change when the axes turn.
-fn invariant_norm(stiffness: &Voigt) -> f64 {
-    let weight = |i: usize| if i == 2 { 2f64.sqrt() } else { 1.0 };
-    Matrix3::from_fn(|i, j| stiffness[(i, j)] * weight(i) * weight(j)).norm()
+    // The part that changes its sign with the two pairs of axes; of a norm that does not change when the axes turn.
+    let gaps = [xx[(0, 1)] - xy[(0, 0)], yy[(0, 1)] - xy[(1, 1)]].map(|gap| 2f64.sqrt() * gap);
+    let gap = Vector3::new(xx[(1, 1)] - yy[(0, 0)], gaps[0], gaps[1]).norm();
+    (stiffness, gap / (xx + yy).norm())
 }
 
 #[cfg(test)]

@@ -185,10 +185,9 @@ pub struct Waves {
     pub worst: [f64; 2],
     /// Length of that wave \[length\].
     pub worst_length: f64,
-    /// Largest eigenvalue of `D^-1 S(k)` \[1\].
+    /// Largest eigenvalue of `D^-1 S(k)`, `D` being what the rule's update divides by \[1\].
     pub largest: f64,
-    /// A synchronous update must be damped below this \[1\]; none where no damping helps or where the
-    /// rule's own weights are not those of its material.
+    /// A synchronous update must be damped below this \[1\]; none where no damping helps.
     pub damping_limit: Option<f64>,
 }
 
@@ -240,6 +239,17 @@ impl MaterialReport {
         }
     }
 
+    /// The material of a rule whose update divides by other blocks than the sums of its own; shape \[sublattices\].
+    pub fn of_rule_over(
+        lattice: &Lattice,
+        rule: String,
+        crystal: &Crystal,
+        divisors: &[Block],
+    ) -> Result<Self, HomogeniseError> {
+        let waves = Waves::of(&crystal.zone_over(divisors)?);
+        Ok(Self { waves, ..Self::of_rule(lattice, rule, crystal)? })
+    }
+
     /// Whether every weight is a number times the identity.
     pub fn is_scalar(&self) -> bool {
         self.weights.iter().all(|w| w.weight[0][1] == 0.0 && w.weight[1][0] == 0.0)
@@ -288,10 +298,7 @@ impl Material {
     }
 
     fn of_sheet(effective: &Effective, elastic: &Elastic) -> Self {
-        let angle = match elastic.constants() {
-            Constants::Orthotropic { angle, .. } => angle,
-            Constants::Isotropic { .. } => 0.0,
-        };
+        let angle = elastic.fibres().unwrap_or(0.0);
         Self::scaled(effective, 1.0, elastic.thickness(), angle, false)
     }
 

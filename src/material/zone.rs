@@ -42,9 +42,17 @@ impl Crystal {
     /// Samples the Brillouin zone and refines the extremes found; refuses a rule that is not symmetric,
     /// and one whose `D` is not positive definite.
     pub fn zone(&self) -> Result<Zone, HomogeniseError> {
+        let own: Vec<_> = (0..self.bonds.len()).map(|s| self.diagonal(s)).collect();
+        self.zone_over(&own)
+    }
+
+    /// As [`Crystal::zone`], of an update that divides by these blocks instead of `D`; shape \[sublattices\].
+    pub fn zone_over(&self, divisors: &[super::Block]) -> Result<Zone, HomogeniseError> {
         self.require_symmetric()?;
-        let inverses: Vec<_> = (0..self.bonds.len())
-            .map(|s| inverse(&self.diagonal(s)).ok_or(HomogeniseError::Singular { sublattice: s }))
+        let inverses: Vec<_> = divisors
+            .iter()
+            .enumerate()
+            .map(|(sublattice, block)| inverse(block).ok_or(HomogeniseError::Singular { sublattice }))
             .collect::<Result<_, _>>()?;
         let roots: Vec<_> = inverses.iter().map(cholesky).collect();
         let growth = |phase: [f64; 2]| self.growth(phase, &roots);

@@ -119,6 +119,12 @@ impl Scene {
         of_roles.map(named("roles")).chain(of_loads.map(named("loads")))
     }
 
+    /// The first key of a region, if any, that picks particles by their ids.
+    pub fn picks_by_ids(&self) -> Option<String> {
+        let by_ids = |region: &SceneRegion| matches!(region, SceneRegion::Known(Region::Ids(_)));
+        self.regions().find(|(_, region)| by_ids(region)).map(|(key, _)| key)
+    }
+
     /// Which role entry, if any, first leads particles to where finite elements have them.
     pub(crate) fn led_by_reference(&self) -> Option<usize> {
         self.roles.iter().position(|entry| matches!(entry.motion, Some(LeaderMotion::Reference { .. })))

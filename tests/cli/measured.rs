@@ -211,6 +211,19 @@ fn regions_and_changes_that_cannot_be_name_the_reason() {
     assert!(said.contains("above a Poisson's ratio of 0.4 (2/3 in plane stress)"), "{said}");
 }
 
+/// Of 1.75 m of height whole cells of 0.5 m leave 1.5 m, a seventh less.
+#[test]
+fn a_run_of_whole_cells_says_when_they_are_not_the_shape() {
+    let more = |height: &str| {
+        let shape = format!("body.shape.max=[4.0,{height}]");
+        let set = ["--figures", "none", "--set", "body.outline=\"lattice\"", "--set", &shape];
+        run(&[BAR, PULL, SOLVED], &set, 0).1
+    };
+    let said = more("1.75");
+    assert!(said.contains("the body is not the shape: its area is -14.29 % off"), "{said}");
+    assert!(!more("2.0").contains("not the shape"));
+}
+
 #[test]
 fn a_bar_in_uniaxial_tension_has_the_stress_of_its_load_everywhere() {
     let place = "[record]\nplaces = [[2.1, 1.3]]\n";
@@ -376,9 +389,9 @@ fn stress_that_is_not_recovered_or_too_low_under_a_load_is_a_caution() {
     let cells = "stress is not recovered along the edges of a body of whole cells";
     let lattice = ["--set", "body.outline=lattice"];
     assert!(caution(&lattice, &[BAR, PULL, SOLVED], cells) && !caution(&[], &[BAR, PULL, SOLVED], cells));
-    // A body by count has no other edges.
+    // A body by count has no other edges: it is to be given by its sides.
     let grid = ["--set", "body.shape={ kind = \"grid\", columns = 9, rows = 5 }"];
-    assert!(!caution(&grid, &[BAR, LEAD], cells));
+    assert!(caution(&grid, &[BAR, LEAD], "give the shape as a rectangle"));
     let on = |from: f64, to: f64| {
         let region = format!("{{ kind = \"outline\", between = [[{from}, 2.0], [{to}, 2.0]] }}");
         format!("[[loads]]\nkind = \"pressure\"\nregion = {region}\npressure = 1e3\n")

@@ -190,6 +190,22 @@ fn what_cannot_be_swept_is_refused_and_leaves_nothing() {
 }
 
 #[test]
+fn ids_that_are_other_particles_in_each_run_are_a_caution() {
+    let folder = temporary();
+    let cautions = |more: &[&str]| {
+        let sweep = ["sweep", "tension", "--set", "stop.steps=2", "--figures", "none", "--force"];
+        let output = flockform(&[&sweep[..], more].concat(), folder.path());
+        text(&output.stderr)
+    };
+    let columns = ["--vary", "body.shape.columns=[10, 12]"];
+    let is_cautioned = |more: &[&str]| cautions(more).contains("then another one's");
+    assert!(is_cautioned(&[&columns[..], &["--outputs", "probe.67.ux"]].concat()));
+    assert!(is_cautioned(&[&columns[..], &["--set", "roles[1].region={kind=\"ids\",ids=[100]}"]].concat()));
+    assert!(!is_cautioned(&[&columns[..], &["--outputs", "energies.pe1"]].concat()));
+    assert!(!is_cautioned(&["--vary", "update.damping=[0.5, 0.8]", "--outputs", "probe.67.ux"]));
+}
+
+#[test]
 fn the_last_line_says_how_the_runs_ended() {
     let folder = temporary();
     let of = |more: &[&str]| {

@@ -161,8 +161,13 @@ fn keys_that_change_the_body_begin_anew_and_wrong_ones_change_nothing() {
         let refused = body.perform(0, &command).expect_err(key);
         assert!(!refused.0.is_empty() && body.engine().step() == 5 && body.layout() == layout, "{key}");
     }
+    ask(&mut body, r#"{"do":"set","key":"update.damping","value":"0.8"}"#);
     ask(&mut body, r#"{"do":"set","key":"lattice.spacing","value":"0.5"}"#);
     assert!(body.engine().step() == 0 && body.layout() != layout);
+    assert_eq!(body.sets(), ["update.damping=0.8", "lattice.spacing=0.5"]);
+    ask(&mut body, r#"{"do":"undo"}"#);
+    ask(&mut body, r#"{"do":"undo"}"#);
+    ask(&mut body, r#"{"do":"set","key":"lattice.spacing","value":"0.5"}"#);
     step(&mut body, 12);
     assert_replays(&body);
     ask(&mut body, r#"{"do":"undo"}"#);

@@ -68,6 +68,11 @@ fn leaders_led_by_hand_broken_robots_and_lost_poses_are_flown_again_to_the_bit()
     fly(&mut swarm, 13);
     assert_eq!(swarm.faults(), []);
     assert_replays(&swarm);
+    // One that begins anew keeps them.
+    ask(&mut swarm, r#"{"do":"set","key":"limits.speed","value":"0.8"}"#);
+    assert_eq!(swarm.sets(), ["flight.noise=0.01", "flight.loss=0.2", "limits.speed=0.8"]);
+    fly(&mut swarm, 5);
+    assert_replays(&swarm);
 }
 
 #[test]
@@ -94,6 +99,9 @@ fn what_the_file_makes_of_the_channel_stays_where_one_part_of_it_is_changed() {
     let mut swarm = begun("square", &[own]);
     fly(&mut swarm, 12);
     assert_eq!(swarm.sets(), ["flight.delay=4", "flight.loss=0.25"]);
+    ask(&mut swarm, r#"{"do":"set","key":"limits.speed","value":"0.8"}"#);
+    assert_eq!(swarm.sets(), ["limits.speed=0.8"]);
+    ask(&mut swarm, r#"{"do":"undo"}"#);
     ask(&mut swarm, r#"{"do":"set","key":"flight.noise","value":"0.01"}"#);
     assert_eq!(swarm.sets(), ["flight.noise=0.01", "flight.delay=4", "flight.loss=0.25"]);
     fly(&mut swarm, 12);

@@ -255,6 +255,39 @@ fn what_a_frame_copies_of_a_liar_or_of_a_lost_robot_moves_no_other() {
     }
 }
 
+/// What is left of weights of both signs when a robot is gone may add up to nothing.
+#[test]
+fn a_dead_robot_sends_no_other_away_where_weights_are_below_zero() {
+    let hexagon = |dead: usize, links: &str| {
+        let place = |k: usize| {
+            let (y, x) = (std::f64::consts::TAU * k as f64 / 6.0).sin_cos();
+            if k == 6 { [0.0; 2] } else { [2.0 * x, 2.0 * y] }
+        };
+        let robots: Vec<String> =
+            (0..7).map(|k| format!("{{ name = \"r{k}\", place = {:?} }}", place(k))).collect();
+        format!(
+            "title = \"hexagon\"\nradius = 0.2\nlinks = {{ {links} }}\nrule = {{ weights = {{ kind = \"solved\" }} }}\nrobots = [{}]\n\
+             leaders = [{{ robots = [\"r0\", \"r2\", \"r4\"], program = {{ kind = \"manoeuvre\", name = \"wide\" }} }}]\n\
+             manoeuvres = [{{ name = \"wide\", legs = [{{ seconds = 5.0, hold = 4.0 }}, {{ seconds = 5.0, stretch = [1.3, 0.8] }}] }}]\n\
+             limits = {{ speed = 1.0, clearance = 0.1 }}\nflight = {{ duration = 60.0, model = {{ kind = \"integrator\" }}, \
+             faults = [{{ robot = \"r{dead}\", at = 2.0, what = {{ kind = \"dead\" }} }}] }}",
+            robots.join(", ")
+        )
+    };
+    for (dead, links) in (0..7).flat_map(|dead| {
+        ["kind = \"nearest\", count = 3", "kind = \"nearest\", count = 6"].map(|links| (dead, links))
+    }) {
+        let swarm = Swarm::parse("hexagon", "hexagon.toml", &hexagon(dead, links), &[], None);
+        let mut flight = Flight::new(&swarm.unwrap_or_else(|error| panic!("{error}"))).expect("flies");
+        while flight.fleet().time() < 60.0 {
+            flight.step();
+        }
+        let places = flight.fleet().places();
+        let farthest = places.iter().map(|place| place[0].hypot(place[1])).fold(0.0, f64::max);
+        assert!(farthest < 4.0, "{dead}, {links}: {farthest} m from the middle");
+    }
+}
+
 #[test]
 fn weights_below_zero_cannot_leave_out_liars() {
     let overrides = [

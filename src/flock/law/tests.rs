@@ -42,6 +42,27 @@ fn a_target_among_all_neighbours_is_the_target() {
 }
 
 #[test]
+fn weights_of_both_signs_that_are_left_do_not_magnify_what_the_neighbours_do() {
+    let (material, present) = triangle();
+    let weights = Weights::Scalar(vec![-1.05, 1.0, 1.0, 1.0, 1.0, 1.0]);
+    let mut flock = Flock {
+        rule: Rule::BARYCENTRE,
+        weights,
+        forces: None,
+        neighbours: Neighbours::from_lists([vec![1, 2, 0], vec![0], vec![0]]),
+        ..material
+    };
+    flock.keep_rest();
+    let target = flock.target_among(0, &present, |k| k != 0).expect("two are left");
+    let moved = |k: usize| [0, 1].map(|axis| present.get(k)[axis] - flock.reference.get(k)[axis]);
+    for axis in [0, 1] {
+        let mean = (1.05 * moved(1)[axis] + moved(2)[axis]) / 2.05;
+        let gone = target[axis] - flock.reference.get(0)[axis];
+        assert!((gone - mean).abs() < 1e-15, "{gone}, of {mean}");
+    }
+}
+
+#[test]
 fn losing_a_neighbour_leaves_the_particle_at_rest() {
     let (mut material, present) = triangle();
     material.forces = None;

@@ -1,9 +1,9 @@
 //! Weights that depend on the present distance, the paper's Eq. 3:
 //! `x_j = sum_k d(k,j)^p x_k / sum_k d(k,j)^p`, the paper's power `p` being 1.
 //!
-//! With `p > 0` far neighbours pull more, "like Hooke's law". Updated synchronously that is
-//! marginal: between two fixed neighbours midpoint + e is mapped to midpoint - e, so large
-//! deformations need the sequential or the damped update to settle.
+//! With `p > 0` far neighbours pull more, "like Hooke's law". Updated synchronously that overshoots: with `p = 1` and
+//! two fixed neighbours midpoint + e is mapped to midpoint - e, and on a square lattice the shortest waves change by
+//! `-(1 + p)` at each step, so that it takes the sequential update, or one that is damped below `2 / (2 + p)`, to settle.
 
 use super::{Neighbour, barycentre};
 use crate::flock::vectors::distance;

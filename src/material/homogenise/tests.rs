@@ -75,6 +75,31 @@ fn eq_1_is_a_material_of_poisson_ratio_minus_one() {
 }
 
 #[test]
+fn a_sheet_below_minus_a_half_is_no_solid_in_plane_strain() {
+    for (poisson, is_solid) in [(-0.4, true), (-0.499, true), (-0.501, false), (-0.95, false)] {
+        let material =
+            Crystal::material(&lattice(KINDS[0]), &sheet(1000.0, poisson, Plane::Stress)).expect("cells");
+        let material = material.effective().expect("symmetric");
+        assert_eq!(material.poisson_plane_strain().is_some(), is_solid, "{poisson}");
+        assert!(material.young_plane_strain().is_none_or(|young| young > 0.0), "{poisson}");
+    }
+}
+
+/// On a lattice of bonds 1 and 2, with equal weights, the misfit is `(2^2 - 1) / (sqrt(2) (2^2 + 1))`.
+#[test]
+fn a_misfit_does_not_turn_with_the_axes() {
+    let kind = LatticeKind::Rectangular { a: 1.0, b: 2.0 };
+    for degrees in [0.0_f64, 22.5, 45.0, 70.0] {
+        let turned = Lattice::new(kind, [0.0; 2], degrees.to_radians());
+        let offsets = FIRST.offsets(&turned).expect("neighbours");
+        let material =
+            Crystal::scalar(&turned, &offsets, None).expect("weights").effective().expect("symmetric");
+        let expected = 3.0 / (2f64.sqrt() * 5.0);
+        assert!((material.misfit - expected).abs() < 1e-12, "{degrees}: {}", material.misfit);
+    }
+}
+
+#[test]
 fn a_scalar_rule_on_a_rectangular_lattice_has_no_symmetric_stress() {
     let material = scalar(KINDS[1], FIRST).effective().expect("symmetric");
     assert!(material.misfit > 0.1, "{}", material.misfit);

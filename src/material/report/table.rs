@@ -142,9 +142,7 @@ impl Material {
         row(f, "nu in plane stress", format_args!("{:.9}", settled(self.poisson_plane_stress)))?;
         match self.poisson_plane_strain {
             Some(poisson) => row(f, "nu in plane strain", format_args!("{:.9}", settled(poisson)))?,
-            None => {
-                row(f, "nu in plane strain", "none: no solid resists an equal stretch with nothing or less")?
-            }
+            None => row(f, "nu in plane strain", "none: no solid has these constants in plane strain")?,
         }
         let young =
             if self.young_plane_stress.abs() < 1e-9 * self.mu.abs() { 0.0 } else { self.young_plane_stress };

@@ -91,10 +91,12 @@ fn of_places(swarm: &Swarm, rule: Rule) -> Result<Formation, SceneError> {
     Ok(formation)
 }
 
-/// Weights by distance and rules with a spacing are marginal or stiff in a synchronous update; half a step settles.
+/// Rules with a spacing are stiff in a synchronous update: half a step settles. The waves of weights by distance grow beyond
+/// 2 over `2 (1 + p)` at most, whatever the links.
 fn default_damping(rule: Rule) -> f64 {
     match rule.mean {
-        Mean::Distance { .. } | Mean::Spaced { .. } => 0.5,
+        Mean::Distance { power } => 1.0 / (1.0 + power.max(1.0)),
+        Mean::Spaced { .. } => 0.5,
         _ => 1.0,
     }
 }

@@ -122,9 +122,12 @@ pub struct DelayMargin {
 pub struct SpeedMargin {
     /// The speed limit \[m/s\].
     pub limit: Option<f64>,
-    /// The time by which the last follower is behind steadily moving leaders under the simulated delay, in the
+    /// The time by which the last follower is behind steadily and slowly moving leaders under the simulated delay, in the
     /// formation \[s\].
     pub lag_s: Option<f64>,
+    /// How much more that is for each of the leaders' metres a second, by the acceleration limit \[s^2/m\]: a robot at a speed of `v` is
+    /// held as far behind its target as it goes while it brakes, `v^2 / (2 a)`.
+    pub lag_per_speed: Option<f64>,
     /// Speed of the leaders up to which followers keep within `flight.bounds.affine_error` of their places \[m/s\], at most
     /// the speed limit; absent without such a bound or a limit, and where followers lag by nothing that could be
     /// measured.
@@ -267,13 +270,18 @@ fn half_life(factor: f64) -> f64 {
 
 fn speed(swarm: &Swarm, formation: &Formation, map: Option<&PeriodMap>, delay: f64) -> SpeedMargin {
     let limit = swarm.raw.limits.speed;
-    let lag_s =
-        map.and_then(PeriodMap::lag).map(|periods| periods * (delay + 1.0) * swarm.raw.control.period);
+    let periods = map.and_then(PeriodMap::lag);
+    let lag_s = periods.map(|periods| periods * (delay + 1.0) * swarm.raw.control.period);
+    let lag_per_speed =
+        periods.zip(swarm.raw.limits.acceleration).map(|(periods, most)| periods / (2.0 * most));
     let felt = lag_s.filter(|lag| *lag >= LEAST_LAG);
-    let by_lag = swarm.raw.flight.bounds.affine_error.zip(felt).map(|(error, lag)| error / lag);
+    let by_lag = swarm.raw.flight.bounds.affine_error.zip(felt).map(|(error, lag)| {
+        // The speed at which the way behind, `lag v + more v^2`, is the error.
+        2.0 * error / (lag + (lag * lag + 4.0 * error * lag_per_speed.unwrap_or(0.0)).sqrt())
+    });
     let reachable = [limit, by_lag].into_iter().flatten().reduce(f64::min).filter(|speed| speed.is_finite());
     let manoeuvres = swarm.manoeuvres.iter().filter_map(|one| needed(formation, &one.name)).collect();
-    SpeedMargin { limit, lag_s, reachable, manoeuvres }
+    SpeedMargin { limit, lag_s, lag_per_speed, reachable, manoeuvres }
 }
 
 /// The largest speed of a place in a manoeuvre.

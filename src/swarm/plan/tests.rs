@@ -194,20 +194,22 @@ fn what_a_network_that_changes_and_commands_do_is_warned_of() {
 }
 
 /// The formation of `faulty-robot` in which every robot believes every other and none lies, led at 1 m/s.
-fn steadily_led(delay: u32) -> Swarm {
+fn steadily_led(delay: u32, limits: &str) -> Swarm {
     let text = bundled_swarm("faulty-robot").expect("bundled").text;
     let text = text.replace("[resilience]\nmax_faulty_neighbours = 1\n", "");
     let path = "leaders[0].program={ kind = \"path\", points = [{ at = 40.0, displacement = [40.0, 0.0] }] }";
     let delay = format!("flight.delay={delay}");
-    let set = [path, "flight.faults=[]", &delay].map(str::to_owned);
+    let set = [path, "flight.faults=[]", &delay, limits].map(str::to_owned);
     Swarm::parse("led", "led.toml", &text, &set, None).unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[test]
 fn a_steadily_led_formation_lags_as_its_plan_says_under_delay_too() {
-    for delay in [0, 3] {
-        let swarm = steadily_led(delay);
-        let lag = SwarmPlan::new(&swarm).expect("laid out").speed.lag_s.expect("linear");
+    let slow = "limits={ speed = 2.0, acceleration = 2.0 }";
+    for (delay, limits) in [(0, "limits={}"), (3, "limits={}"), (0, slow)] {
+        let swarm = steadily_led(delay, limits);
+        let margin = SwarmPlan::new(&swarm).expect("laid out").speed;
+        let lag = margin.lag_s.expect("linear") + margin.lag_per_speed.unwrap_or(0.0);
         let mut flight = Flight::new(&swarm).expect("flies");
         let periods = (30.0 / swarm.raw.control.period) as usize;
         (0..periods).for_each(|_| flight.step());
@@ -235,7 +237,7 @@ fn nothing_is_predicted_of_a_loop_that_is_not_linear_and_the_plan_says_why() {
                    robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [1.0, 0.0] }]\n";
     let swarm = Swarm::parse("two", "two.toml", present, &[], None).unwrap_or_else(|e| panic!("{e}"));
     assert!(reason(&SwarmPlan::new(&swarm).expect("laid out")).contains("anew"));
-    let led = SwarmPlan::new(&steadily_led(0)).expect("laid out");
+    let led = SwarmPlan::new(&steadily_led(0, "limits={}")).expect("laid out");
     assert_eq!((led.convergence.is_some(), led.not_predicted), (true, None));
 }
 

@@ -82,10 +82,13 @@ impl fmt::Display for SwarmPlan {
             None => "no two robots have a clearance to keep".to_owned(),
         };
         line("noise margin", format!("{held}; simulated {} m", self.noise.simulated))?;
-        let SpeedMargin { limit, lag_s, reachable, manoeuvres } = &self.speed;
+        let SpeedMargin { limit, lag_s, lag_per_speed, reachable, manoeuvres } = &self.speed;
         line("speed limit", limit.map_or("none".into(), |limit| format!("{limit} m/s")))?;
         if let Some(lag) = lag_s {
-            line("lag", format!("followers are up to {lag:.3} s behind steady leaders"))?;
+            let more = lag_per_speed.filter(|more| *more >= NOTHING).map_or(String::new(), |more| {
+                format!(", and {more:.3} s more for each m/s of them, by the acceleration limit")
+            });
+            line("lag", format!("followers are up to {lag:.3} s behind steady leaders{more}"))?;
         }
         match (reachable, lag_s) {
             (Some(speed), _) => line("reachable speed", format!("{speed:.4} m/s"))?,

@@ -58,7 +58,7 @@ fn coincident(scene: &Scene) -> Result<Outcome, SceneError> {
     let mut overrides = vec![TO_A_POINT.to_owned(), format!("rule={}", scaling::toml(&mean))];
     overrides
         .extend(["lattice", "neighbours", "material"].iter().filter_map(|key| scaling::table(scene, key)));
-    // Weights that grow with distance are marginal in a synchronous update.
+    // Weights that grow with distance let waves of an undamped synchronous update grow.
     overrides.push("update.order=\"sequential\"".into());
     let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
     if let Mean::Spaced { .. } = scene.mean {
