@@ -52,16 +52,25 @@ impl Filter {
             return ([pose; 2], Flags(Flags::HELD));
         }
         let brakes = self.crowd.brakes;
-        let (here, most) = self.place(seen, period, member);
-        let way = minus(wanted, here);
-        let velocity = self.motion(seen, period, member);
+        let (from, most) = self.place(seen, period, member);
+        let (mut here, mut way) = (from, minus(wanted, from));
+        let mut velocity = self.motion(seen, period, member);
         let mut request = self.request(velocity, way, period, most);
         let mut origins = self.enclose(seen, &mut request, here, member);
         let whole = self.limits.speed * period;
-        if most < whole && self.cell.is_left() {
-            // What it was sent to is no longer its own: it is not waited for.
-            request = self.request(velocity, way, period, whole);
+        let lag = distance(pose, here);
+        if self.cell.excess([0.0; 2]) > TOUCHING * lag && lag > 0.0 {
+            // Where it was sent is no longer its own: it goes back into its cell, or is not waited for, at any acceleration.
+            velocity = None;
+            // No point that is nearest to the wanted one is farther, if its pose is in the cell.
+            let reach = whole.min(2.0 * length(way) + lag);
+            request = MotionRequest { reach, ..self.request(None, way, period, whole) };
             origins = self.enclose(seen, &mut request, here, member);
+            if self.cell.is_empty(request.reach) {
+                (here, way) = (pose, minus(wanted, pose));
+                request = self.request(None, way, period, self.most_from_pose(seen, period, member));
+                origins = self.enclose(seen, &mut request, here, member);
+            }
         }
         let open = shortened(way, request.reach);
         let mut flags = self.why(open, origins);
@@ -85,6 +94,7 @@ impl Filter {
             None => shortened(goal, request.step),
         };
         let step = if brakes { step } else { self.unmoved_by_noise(here, step, &request, member) };
+        let step = if here == from { step } else { self.within_speed(step, minus(from, here), whole) };
         let step = self.cast(here, step, origins, member);
         if request.distance > request.step {
             flags.0 |= Flags::SPEED_LIMITED;
@@ -102,8 +112,7 @@ impl Filter {
         let (pose, last) = (seen.present.get(member), self.sent.get(member));
         let (ahead, margin, most) =
             (self.ahead(seen, member), self.limits.margin(), self.limits.speed * period);
-        // Nothing says that one that is not on its way has gone on by a limit that was higher.
-        let from_pose = (pose, most + if ahead > 0.0 { self.limits.speed * ahead } else { 0.0 });
+        let from_pose = (pose, self.most_from_pose(seen, period, member));
         if self.crowd.brakes || !last.iter().all(|x| x.is_finite()) {
             return from_pose;
         }
@@ -120,6 +129,13 @@ impl Filter {
         }
         let room = self.longest_step(period, ahead) + 2.0 * margin - distance(last, pose);
         (last, room.clamp(0.0, most))
+    }
+
+    /// How far a member may be sent from its pose \[m\]: a period on, and the time since. Nothing says that one that is not on its way
+    /// has gone on by a limit that was higher.
+    fn most_from_pose(&self, seen: &Seen, period: f64, member: usize) -> f64 {
+        let ahead = self.ahead(seen, member);
+        self.limits.speed * period + if ahead > 0.0 { self.limits.speed * ahead } else { 0.0 }
     }
 
     fn request(&self, velocity: Option<[f64; 2]>, way: [f64; 2], period: f64, step: f64) -> MotionRequest {
@@ -299,6 +315,20 @@ impl Filter {
         }
         let back = shortened(back, request.step);
         if self.cell.excess(back) <= self.cell.excess(step) { back } else { step }
+    }
+
+    /// The step, or less of the way to its end from where the member was sent, relative to its pose \[m\]: that is the way that it makes.
+    /// One that lags need not have the cell in which that place was.
+    fn within_speed(&self, step: [f64; 2], from: [f64; 2], most: f64) -> [f64; 2] {
+        let way = minus(step, from);
+        let on = shortened(way, most);
+        if on == way {
+            return step;
+        }
+        let end = plus(from, on);
+        let leaves =
+            |plane: &HalfPlane| dot(plane.normal, end) > plane.offset.max(0.0) + TOUCHING * length(end);
+        if !self.limits.arrives && self.cell.planes.iter().any(leaves) { shortened(step, most) } else { end }
     }
 
     /// The origins of the planes between the member and the end of its way.
