@@ -478,6 +478,28 @@ fn random_phase(k: usize) -> f64 {
     0.2 * ((k * 7) as f64).sin()
 }
 
+/// A robot that does not follow is waited for where it was sent, with noise behind it; as another comes near that place, sent by a loop of
+/// its own, the target comes back into the cell.
+#[test]
+fn a_robot_that_is_waited_for_is_not_sent_to_where_another_has_come() {
+    let limits = Limits { deviation: 0.02, ..limits(1.0, 0.1) };
+    let keep = 0.2 + 0.2 + 0.1 + 6.0 * limits.deviation;
+    let ways = [[[0.0, 0.0], [5.0, 0.0]], [[4.0, 0.0], [4.0, 0.0]]];
+    let mut world = World::new(limits, 0.2, &[], &ways);
+    let mut farthest = 0.0_f64;
+    for tick in 0..60 {
+        let apart = (4.0 - 0.08 * f64::from(tick)).max(0.7);
+        world.present = [[0.0, 0.0], [apart, 0.0]].into_iter().collect();
+        world.goals = [[5.0, 0.0], [apart, 0.0]].into_iter().collect();
+        world.tick();
+        let [ahead, _] = world.safe.get(0);
+        farthest = farthest.max(ahead);
+        let own = ((apart - keep) / 2.0).max(0.0);
+        assert!(ahead <= own + 1e-9, "{ahead} m ahead in tick {tick}, of {own}");
+    }
+    assert!(farthest > 0.2, "{farthest}");
+}
+
 #[test]
 fn velocity_changes_no_faster_than_allowed_and_a_robot_stops_at_its_goal() {
     let limits = Limits { acceleration: 0.5, ..limits(1.0, 0.1) };

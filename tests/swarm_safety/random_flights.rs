@@ -379,6 +379,28 @@ fn poses_that_are_noisy_and_late_do_not_lead_robots_into_each_other() {
     }
 }
 
+/// A robot that stands between a wall and one that fell silent, and is lost itself now and then, stays where it was sent: a step
+/// from each noisy pose with which it came back led it into the wall.
+#[test]
+fn a_robot_that_is_lost_now_and_then_does_not_go_after_its_noise() {
+    for (seed, noise) in (0..12).flat_map(|seed| [(seed, 0.002), (seed, 0.02)]) {
+        let text = format!(
+            "title = \"wall\"\nradius = 0.2\nlinks = {{ kind = \"listed\" }}\n\
+             robots = [{{ name = \"a\", place = [0.0, 0.0] }}, {{ name = \"b\", place = [1.2, 0.0] }}]\n\
+             leaders = [{{ robots = [\"a\", \"b\"], program = {{ kind = \"path\", points = [{{ at = 0.1, displacement = [0.0, 0.0] }}] }} }}]\n\
+             obstacles = [{{ kind = \"polygon\", vertices = [[-2.0, 0.36], [2.0, 0.36], [2.0, 0.9], [-2.0, 0.9]] }}]\n\
+             limits = {{ speed = 1.0, clearance = 0.1 }}\nposes = {{ age_limit = 1.0, stop_after = 4.0 }}\ncontrol = {{ period = 0.2 }}\n\
+             flight = {{ duration = 60.0, model = {SINGLE}, noise = {noise}, delay = 4, loss = 0.5, seed = {seed}, \
+             faults = [{{ robot = \"b\", at = 1.0, what = {{ kind = \"silent\" }} }}] }}\n"
+        );
+        let swarm =
+            Swarm::parse("wall", "wall.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+        let (_, report) = fly(&swarm, &mut |_, _| ControlFlow::Continue(())).expect("flies");
+        let clearance = report.clearance.expect("there is a wall");
+        assert!(clearance >= 0.1, "{noise} m, flight {seed}: {clearance}");
+    }
+}
+
 /// Two that pass each other, behind poses off by more than the acceleration leads in a period, of which the file says nothing.
 #[test]
 fn poses_that_are_less_exact_than_declared_do_not_bring_robots_that_brake_nearer_than_they_are_off() {

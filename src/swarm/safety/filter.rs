@@ -1,6 +1,6 @@
 //! The filter: one pass over the members, each with a cell of its own.
 
-use super::cell::{Cell, HalfPlane, length, shortened};
+use super::cell::{Cell, length};
 use super::deadlock::Detour;
 use super::limits::{Limits, Place, SafetyError};
 use super::obstacles::Obstacles;
@@ -9,7 +9,7 @@ use super::ways::Ways;
 use crate::flock::grid::CellGrid;
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::vectors::{Vectors, distance};
-use crate::geometry::point::{dot, minus, plus};
+use crate::geometry::point::{minus, plus};
 
 /// The reasons for changing a target, and other events of a tick, as bits that may be combined; those of the message `flockform_msgs/MemberState`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -84,7 +84,7 @@ pub struct Filter {
     pub(super) obstacles: Obstacles,
     pub(super) fence: Obstacles,
     pub(super) detours: Vec<Detour>,
-    /// Targets of the last tick and of the one before \[m\]; not finite before there were any.
+    /// Targets of the last tick, and where members were a period before they are to be there \[m\]; not finite before there were any.
     pub(super) sent: Vectors,
     pub(super) sent_before: Vectors,
     pub(super) crowd: Crowd,
@@ -195,7 +195,7 @@ impl Filter {
     pub(super) fn is_on_its_way(&self, seen: &Seen, period: f64, member: usize) -> bool {
         let way = self.longest_way(period + seen.ages[member].max(0.0));
         distance(seen.present.get(member), self.sent.get(member))
-            <= way * (1.0 + TOUCHING) + 2.0 * self.limits.margin()
+            <= way * (1.0 + TOUCHING) + 4.0 * self.limits.margin()
     }
 
     /// The speed that the members themselves keep to \[m/s\]: a lower limit of this node brings their targets nearer.
@@ -249,11 +249,20 @@ impl Filter {
         self.meet(seen, wanted, period);
         safe.clone_from(seen.present);
         for (member, flags) in flags.iter_mut().enumerate() {
-            let (target, mut changed) = self.target(seen, wanted.get(member), period, member);
-            let target = self.within_speed(seen, target, period, member, &mut changed);
-            // One that is sent nowhere may be anywhere when it is heard again.
-            let sent = if seen.known[member] { target } else { [f64::NAN; 2] };
-            self.sent_before.set(member, self.sent.get(member));
+            let ([from, target], changed) = self.target(seen, wanted.get(member), period, member);
+            let last = self.sent.get(member);
+            // One that brakes and is sent nowhere may be anywhere when it is heard again; others stand where they were sent.
+            let [before, sent] = match (seen.known[member], self.crowd.brakes) {
+                (true, _) => {
+                    // From a late pose it is sent on for as long as that is old, too.
+                    let share =
+                        if from == last { 1.0 } else { period / (period + seen.ages[member].max(0.0)) };
+                    [plus(target, minus(from, target).map(|d| share * d)), target]
+                }
+                (false, true) => [[f64::NAN; 2]; 2],
+                (false, false) => [last; 2],
+            };
+            self.sent_before.set(member, before);
             self.sent.set(member, sent);
             safe.set(member, target);
             *flags = changed;
@@ -262,51 +271,6 @@ impl Filter {
         let oldest = seen.ages.iter().copied().fold(0.0, f64::max) + period;
         self.earlier.iter_mut().for_each(|(_, since)| *since += period);
         self.earlier.retain(|&(_, since)| since <= oldest + period);
-    }
-
-    /// Cuts the way from the last target to this one, where the member is taken to be at the last one but seen elsewhere,
-    /// late or through noise: the step from where it is seen is not the step it makes. Both ends lie in the cell that its
-    /// true place has, which is convex, so the end of the shorter way does too.
-    fn within_speed(
-        &self,
-        seen: &Seen,
-        target: [f64; 2],
-        period: f64,
-        member: usize,
-        flags: &mut Flags,
-    ) -> [f64; 2] {
-        let (here, last) = (seen.present.get(member), self.sent.get(member));
-        // One that has not come so far, or was carried away, is given its way from where it is seen.
-        let age = seen.ages[member].max(0.0);
-        let is_near = self.is_on_its_way(seen, period, member);
-        let goes_on = is_near && (self.ahead(seen, member) > 0.0 || self.limits.deviation > 0.0);
-        let is_there = is_near || age > (1.0 - TOUCHING) * period || self.limits.deviation > 0.0;
-        let has_arrived =
-            self.limits.arrives && seen.known[member] && is_there && self.is_inexact(seen, period, member);
-        let is_elsewhere = goes_on || has_arrived;
-        if !is_elsewhere || !last.iter().all(|x| x.is_finite()) {
-            // Nothing says that it has gone on by a limit that was higher.
-            if !self.earlier.is_empty() {
-                let most = self.limits.speed * (period + self.ahead(seen, member));
-                return plus(here, shortened(minus(target, here), most));
-            }
-            return target;
-        }
-        let way = minus(target, last);
-        let step = shortened(way, self.limits.speed * period);
-        if step == way {
-            return target;
-        }
-        flags.0 |= Flags::SPEED_LIMITED;
-        let place = plus(last, step);
-        // One that lags behind its targets need not have the cell in which the last one was.
-        let out = minus(place, here);
-        let leaves =
-            |plane: &HalfPlane| dot(plane.normal, out) > plane.offset.max(0.0) + TOUCHING * length(out);
-        if !self.limits.arrives && self.cell.planes.iter().any(leaves) {
-            return plus(here, shortened(minus(target, here), self.limits.speed * period));
-        }
-        place
     }
 
     /// Time for which a member has gone on to its targets since its pose, if they are known \[s\]: by so much farther from

@@ -104,8 +104,10 @@
 //! One that does not brake is sent back to where it was last sent, where no place is far enough from all and that one
 //! is no farther out of its cell: a step from each pose would go after the noise. That leaves the declared clearance
 //! in all of the random flights that begin with it, late poses or not (`tests/swarm_safety`). One that is seen no farther from where it
-//! was last sent than it goes in a period, and six deviations, is sent on from there: steps from its poses would lose what noise puts
-//! them back by, and gain nothing where it puts them forward. Two members whose hulls
+//! was last sent than it goes in a period, and twelve deviations, is sent on from there, where it stays within reach: steps from its
+//! poses would lose what noise puts them back by, and gain nothing where it puts them forward. Where that place is no longer in its
+//! cell, as others come nearer than where it lags, its target is the place in the cell within a period of it, and, where there is none,
+//! one by its pose. Two members whose hulls
 //! noise brings nearer than allowed part, as two fresh ones do. One case is not
 //! covered: in a gap between solids that is narrower than the widened distances the way out is undetermined, and
 //! noise leads a member deeper.

@@ -20,15 +20,6 @@ struct MotionRequest {
     reach: f64,
 }
 
-/// A member's motion as far as it is known.
-#[derive(Clone, Copy)]
-struct Motion {
-    /// Its place, relative to that of its pose \[m\].
-    from: [f64; 2],
-    /// \[m/s\]
-    velocity: [f64; 2],
-}
-
 /// The origins of a cell's planes, by their index: first members, then obstacles, then the fence.
 #[derive(Clone, Copy)]
 struct Origins {
@@ -46,115 +37,141 @@ const CAST_TOLERANCE: f64 = 1e-7;
 pub(super) const TOUCHING: f64 = 1e-9;
 
 impl Filter {
-    /// The target of one member, with the reasons for changing it.
+    /// The place from which a member is sent on and its target \[m, world frame\], with the reasons for changing that.
     pub(super) fn target(
         &mut self,
         seen: &Seen,
         wanted: [f64; 2],
         period: f64,
         member: usize,
-    ) -> ([f64; 2], Flags) {
-        let here = seen.present.get(member);
-        let way = minus(wanted, here);
-        if !seen.known[member] || !way.iter().all(|value| value.is_finite()) {
+    ) -> ([[f64; 2]; 2], Flags) {
+        let pose = seen.present.get(member);
+        if !seen.known[member] || !minus(wanted, pose).iter().all(|value| value.is_finite()) {
             self.detours[member].reset();
             self.cell.planes.clear();
-            return (here, Flags(Flags::HELD));
+            return ([pose; 2], Flags(Flags::HELD));
         }
         let brakes = self.crowd.brakes;
-        let motion = self.motion(seen, period, member);
-        let from = self.sent_by_noisy_poses(seen, period, member).filter(|_| motion.is_none());
-        let mut request = self.request(motion, way, period, self.ahead(seen, member), from);
-        let origins = self.enclose(seen, &mut request, member);
-        let open = match from {
-            None => shortened(way, request.reach),
-            Some(from) => {
-                let on = minus(way, from);
-                let step = shortened(on, self.limits.speed * period);
-                if step == on { way } else { plus(from, step) }
+        let (from, most) = self.place(seen, period, member);
+        let (mut here, mut way) = (from, minus(wanted, from));
+        let mut velocity = self.motion(seen, period, member);
+        let mut request = self.request(velocity, way, period, most);
+        let mut origins = self.enclose(seen, &mut request, here, member);
+        let whole = self.limits.speed * period;
+        let lag = distance(pose, here);
+        if self.cell.excess([0.0; 2]) > TOUCHING * lag && lag > 0.0 {
+            // Where it was sent is no longer its own: it goes back into its cell, or is not waited for, at any acceleration.
+            velocity = None;
+            // No point that is nearest to the wanted one is farther, if its pose is in the cell.
+            let reach = whole.min(2.0 * length(way) + lag);
+            request = MotionRequest { reach, ..self.request(None, way, period, whole) };
+            origins = self.enclose(seen, &mut request, here, member);
+            if self.cell.is_empty(request.reach) {
+                (here, way) = (pose, minus(wanted, pose));
+                request = self.request(None, way, period, self.most_from_pose(seen, period, member));
+                origins = self.enclose(seen, &mut request, here, member);
             }
-        };
-        let mut flags = self.why(open, origins);
-        if let Some(Motion { from, .. }) = motion.filter(|_| !brakes) {
-            self.leave_room_to_brake(&mut request, from, period, &mut flags);
         }
-        let hindered = flags != Flags::default() || motion.is_some();
+        let open = shortened(way, request.reach);
+        let mut flags = self.why(open, origins);
+        if velocity.is_some() && !brakes {
+            self.leave_room_to_brake(&mut request, period, &mut flags);
+        }
+        let hindered = flags != Flags::default() || velocity.is_some();
         let goal = if !hindered && self.detours[member].is_fresh() {
             open
         } else {
-            self.around(seen, &request, member, &mut flags)
+            self.around(seen, &request, here, member, &mut flags)
         };
-        let step = match motion {
-            Some(Motion { velocity, .. }) if brakes => {
+        let step = match velocity {
+            Some(velocity) if brakes => {
                 let promised = self.promised(seen, member);
                 self.brakable(velocity, promised, goal, period, &mut flags)
             }
-            Some(motion) => {
-                shortened(self.steered(motion, goal, period, (&request, origins), &mut flags), request.step)
+            Some(velocity) => {
+                shortened(self.steered(velocity, goal, period, (&request, origins), &mut flags), request.step)
             }
             None => shortened(goal, request.step),
         };
         let step = if brakes { step } else { self.unmoved_by_noise(here, step, &request, member) };
+        let step = if here == from { step } else { self.within_speed(step, minus(from, here), whole) };
         let step = self.cast(here, step, origins, member);
         if request.distance > request.step {
             flags.0 |= Flags::SPEED_LIMITED;
         }
         // An unchanged way gives the wanted target to the last bit.
         let target = if step == way { wanted } else { plus(here, step) };
-        (target, flags)
+        ([here, target], flags)
     }
 
-    /// Where a member whose poses are noisy was last sent, relative to its pose \[m\], if it is there or on its way there. It is sent on
-    /// from there: each step from its pose would lose what noise puts that back by, and gain nothing where it puts it forward, since
-    /// the member goes no faster, and one that turns first would turn after the noise.
-    fn sent_by_noisy_poses(&self, seen: &Seen, period: f64, member: usize) -> Option<[f64; 2]> {
-        let is_noisy = self.limits.deviation > 0.0 && self.is_on_its_way(seen, period, member);
-        is_noisy.then(|| minus(self.sent.get(member), seen.present.get(member)))
+    /// The place from which a member is sent on \[m, world frame\], and how far it may be sent from there \[m\]: that of its pose, or,
+    /// where poses are late or noisy, the one to which it was last sent, if it is there or on its way there. The step from where it is
+    /// seen is not the step it makes: each would lose what noise puts the pose back by, and gain nothing where it puts it forward,
+    /// since the member goes no faster, and one that turns first would turn after the noise. One that lags is waited for.
+    fn place(&self, seen: &Seen, period: f64, member: usize) -> ([f64; 2], f64) {
+        let (pose, last) = (seen.present.get(member), self.sent.get(member));
+        let (ahead, margin, most) =
+            (self.ahead(seen, member), self.limits.margin(), self.limits.speed * period);
+        let from_pose = (pose, self.most_from_pose(seen, period, member));
+        if self.crowd.brakes || !last.iter().all(|x| x.is_finite()) {
+            return from_pose;
+        }
+        let is_near = self.is_on_its_way(seen, period, member);
+        if self.limits.arrives && seen.known[member] && self.is_inexact(seen, period, member) {
+            let is_there = is_near || seen.ages[member] > (1.0 - TOUCHING) * period || margin > 0.0;
+            return if is_there { (last, most) } else { from_pose };
+        }
+        // Two late poses give no velocity.
+        let is_inexact =
+            ahead > 0.0 || (self.velocity(seen, member).is_some() && self.is_inexact(seen, period, member));
+        if !is_near || !(is_inexact || margin > 0.0) {
+            return from_pose;
+        }
+        let room = self.longest_step(period, ahead) + 2.0 * margin - distance(last, pose);
+        (last, room.clamp(0.0, most))
     }
 
-    fn request(
-        &self,
-        motion: Option<Motion>,
-        way: [f64; 2],
-        period: f64,
-        ahead: f64,
-        from: Option<[f64; 2]>,
-    ) -> MotionRequest {
-        let (step, distance) = (self.longest_step(period, ahead), length(way));
-        match motion {
-            None => {
-                let off = from.map_or(0.0, length);
-                let step = step.max(off + self.limits.speed * period);
-                MotionRequest { way, distance, step, reach: distance.max(off).min(step) }
-            }
-            Some(Motion { from, velocity }) => {
-                let (most, ahead) = (self.limits.acceleration, length(from));
+    /// How far a member may be sent from its pose \[m\]: a period on, and the time since. Nothing says that one that is not on its way
+    /// has gone on by a limit that was higher.
+    fn most_from_pose(&self, seen: &Seen, period: f64, member: usize) -> f64 {
+        let ahead = self.ahead(seen, member);
+        self.limits.speed * period + if ahead > 0.0 { self.limits.speed * ahead } else { 0.0 }
+    }
+
+    fn request(&self, velocity: Option<[f64; 2]>, way: [f64; 2], period: f64, step: f64) -> MotionRequest {
+        let distance = length(way);
+        match velocity {
+            None => MotionRequest { way, distance, step, reach: distance.min(step) },
+            Some(velocity) => {
+                let most = self.limits.acceleration;
                 // One whose limit has been lowered slows down.
                 let top = (length(velocity) + most * period).min(self.limits.speed.max(length(velocity)));
                 let reach = if self.crowd.brakes {
                     // To the end of the longest step, and of the braking after it.
                     0.5 * period * length(velocity) + self.braking().covered([top, 0.0], period)[0]
                 } else {
-                    ahead + top * period + top * top / (2.0 * most)
+                    top * period + top * top / (2.0 * most)
                 };
-                MotionRequest { way, distance, step: step.min(ahead + top * period), reach }
+                MotionRequest { way, distance, step: step.min(top * period), reach }
             }
         }
     }
 
-    /// Where the member is taken to be and how it moves, where a limit asks for it. A late pose is of a place that the
+    /// The velocity at which the member is taken to go \[m/s\], where a limit asks for it. Late poses are of places that the
     /// member has left, and two noisy ones give no velocity: it is then taken to go from target to target. Those that
-    /// brake have estimates of both.
-    fn motion(&self, seen: &Seen, period: f64, member: usize) -> Option<Motion> {
+    /// brake have estimates.
+    fn motion(&self, seen: &Seen, period: f64, member: usize) -> Option<[f64; 2]> {
         let velocity = self.velocity(seen, member)?;
-        let here = seen.present.get(member);
         let [last, before] = [&self.sent, &self.sent_before].map(|sent| sent.get(member));
         let is_known = last.iter().chain(&before).all(|x| x.is_finite());
-        if self.brakes(seen) || !is_known || !self.is_inexact(seen, period, member) {
-            return Some(Motion { from: [0.0; 2], velocity });
+        if self.brakes(seen) || !self.is_inexact(seen, period, member) {
+            return Some(velocity);
         }
-        let velocity = [0, 1].map(|k| (last[k] - before[k]) / period);
-        Some(Motion { from: minus(last, here), velocity: shortened(velocity, self.limits.speed) })
+        if !is_known {
+            // What noise makes of two places may be any velocity: one that was sent nowhere yet is taken to stand.
+            return Some(if self.limits.deviation > 0.0 { [0.0; 2] } else { velocity });
+        }
+        Some(shortened([0, 1].map(|k| (last[k] - before[k]) / period), self.limits.speed))
     }
 
     /// The place at which a member stands as soon as it can \[m, world frame\]: where its targets are known not behind it, as the place
@@ -174,7 +191,7 @@ impl Filter {
         let before = self.sent_before.get(member);
         let sent = length(minus(last, before)) / period;
         let most = if is_on_its_way && sent.is_finite() { sent.min(self.limits.speed) } else { 0.0 };
-        let way = self.motion(seen, period, member).map_or([0.0; 2], |Motion { velocity, .. }| {
+        let way = self.motion(seen, period, member).map_or([0.0; 2], |velocity| {
             let velocity = shortened(velocity, most);
             velocity.map(|v| v * length(velocity) / (2.0 * self.limits.acceleration))
         });
@@ -188,14 +205,30 @@ impl Filter {
     }
 
     /// Builds the member's cell; with more reach where it stands too near to something, since it then moves away.
-    fn enclose(&mut self, seen: &Seen, request: &mut MotionRequest, member: usize) -> Origins {
-        let origins = self.build_cell(seen, request.reach, member);
+    fn enclose(
+        &mut self,
+        seen: &Seen,
+        request: &mut MotionRequest,
+        here: [f64; 2],
+        member: usize,
+    ) -> Origins {
+        let origins = self.cell_around(seen, request.reach, here, member);
         let away = self.radii[member] + self.largest_radius + self.limits.clearance;
         if request.reach >= away || !self.cell.planes.iter().any(|plane| plane.offset < -TOUCHING * away) {
             return origins;
         }
         request.reach = away.min(request.step).max(request.reach);
-        self.build_cell(seen, request.reach, member)
+        self.cell_around(seen, request.reach, here, member)
+    }
+
+    /// Builds the member's cell, which is that of its pose, relative to a place \[m, world frame\].
+    fn cell_around(&mut self, seen: &Seen, reach: f64, here: [f64; 2], member: usize) -> Origins {
+        let from = minus(here, seen.present.get(member));
+        let origins = self.build_cell(seen, reach + length(from), member);
+        for plane in &mut self.cell.planes {
+            plane.offset -= dot(plane.normal, from);
+        }
+        origins
     }
 
     fn build_cell(&mut self, seen: &Seen, reach: f64, member: usize) -> Origins {
@@ -284,6 +317,20 @@ impl Filter {
         if self.cell.excess(back) <= self.cell.excess(step) { back } else { step }
     }
 
+    /// The step, or less of the way to its end from where the member was sent, relative to its pose \[m\]: that is the way that it makes.
+    /// One that lags need not have the cell in which that place was.
+    fn within_speed(&self, step: [f64; 2], from: [f64; 2], most: f64) -> [f64; 2] {
+        let way = minus(step, from);
+        let on = shortened(way, most);
+        if on == way {
+            return step;
+        }
+        let end = plus(from, on);
+        let leaves =
+            |plane: &HalfPlane| dot(plane.normal, end) > plane.offset.max(0.0) + TOUCHING * length(end);
+        if !self.limits.arrives && self.cell.planes.iter().any(leaves) { shortened(step, most) } else { end }
+    }
+
     /// The origins of the planes between the member and the end of its way.
     fn why(&self, way: [f64; 2], origins: Origins) -> Flags {
         let mut flags = Flags::default();
@@ -300,9 +347,16 @@ impl Filter {
     }
 
     /// The point of the cell to go to: the nearest to the wanted one or, of a detour, to its aim.
-    fn around(&mut self, seen: &Seen, request: &MotionRequest, member: usize, flags: &mut Flags) -> [f64; 2] {
+    fn around(
+        &mut self,
+        seen: &Seen,
+        request: &MotionRequest,
+        here: [f64; 2],
+        member: usize,
+        flags: &mut Flags,
+    ) -> [f64; 2] {
         let MotionRequest { way, distance, step, reach } = *request;
-        let place = plus(seen.present.get(member), way);
+        let place = plus(here, way);
         let direct = self.cell.nearest(way, reach);
         let size = self.radii[member] + self.limits.clearance;
         // Nearer to its goal than its own size, a member waits for the one that stands there; as near as solids and lost members
@@ -367,13 +421,7 @@ impl Filter {
     /// Brings the cell's borders and the end of the way as near as the member can go in a period and brake
     /// in time after it, `v T + v^2 / (2 a)` being the room from where it is: a member that kept to this at the last tick
     /// can do so at this one, as long as the borders stay.
-    fn leave_room_to_brake(
-        &mut self,
-        request: &mut MotionRequest,
-        from: [f64; 2],
-        period: f64,
-        flags: &mut Flags,
-    ) {
+    fn leave_room_to_brake(&mut self, request: &mut MotionRequest, period: f64, flags: &mut Flags) {
         let most = self.limits.acceleration;
         // The difference of two times would lose all its digits where the limit is large.
         let step = |room: f64| {
@@ -381,13 +429,10 @@ impl Filter {
             (2.0 * room * period / (time + period)).min(room)
         };
         let end = self.cell.nearest(request.way, request.reach);
-        let brakable = length(from) + step(length(minus(end, from)));
+        let brakable = step(length(end));
+        // At the border or beyond it as it is, there is nothing to bring nearer.
         for plane in self.cell.planes.iter_mut().filter(|plane| plane.offset > 0.0) {
-            let gone = dot(plane.normal, from);
-            // At the border or beyond it as it is, there is nothing to bring nearer.
-            if plane.offset > gone {
-                plane.offset = (gone + step(plane.offset - gone)).max(0.0);
-            }
+            plane.offset = step(plane.offset);
         }
         if brakable < request.step.min(request.distance) {
             flags.0 |= Flags::ACCELERATION_LIMITED;
@@ -399,19 +444,19 @@ impl Filter {
     /// comes first where it leaves none.
     fn steered(
         &self,
-        Motion { from, velocity }: Motion,
+        velocity: [f64; 2],
         goal: [f64; 2],
         period: f64,
         (request, origins): (&MotionRequest, Origins),
         flags: &mut Flags,
     ) -> [f64; 2] {
-        let change = [0, 1].map(|k| (goal[k] - from[k]) / period - velocity[k]);
+        let change = [0, 1].map(|k| goal[k] / period - velocity[k]);
         let held = shortened(change, self.limits.acceleration * period);
         if held == change {
             return goal;
         }
         flags.0 |= Flags::ACCELERATION_LIMITED;
-        let next = [0, 1].map(|k| from[k] + (velocity[k] + held[k]) * period);
+        let next = [0, 1].map(|k| (velocity[k] + held[k]) * period);
         flags.0 |= self.why(next, origins).0;
         self.cell.nearest(next, request.step)
     }
