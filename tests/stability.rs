@@ -114,6 +114,17 @@ fn over_relaxation_and_sequential_sweeps_have_their_textbook_thresholds() {
     }
 }
 
+/// Of two rows of three, one end held, the followers' means have the spectral radius 5/6; what is moved comes to rest elsewhere.
+#[test]
+fn a_body_that_does_not_rest_where_it_is_laid_out_has_its_thresholds_too() {
+    let shape = "body.shape={kind=\"grid\",columns=3,rows=2}";
+    let held = "roles=[{region={kind=\"edge\",side=\"left\"},role=\"clamped\"}]";
+    let literal = linear("tension", &["frame=none", NO_PROBES, "rule.rest=\"literal\"", shape, held]);
+    for found in threshold(&literal, Parameter::Feedback, Side::Upper) {
+        assert!((found - 0.2).abs() < 1e-4, "{found}");
+    }
+}
+
 #[test]
 fn the_measured_factor_is_the_spectral_radius() {
     let scene = load("tension", &[]);

@@ -39,6 +39,18 @@ fn undamped(scene: &Scene) -> Result<MaterialReport, SceneError> {
         return Err(scene.refuse("body.shape", message, help));
     }
     check_homogeneous(scene)?;
+    if let Mean::Distance { power } = scene.mean
+        && power <= 2.0 * FALLS_TOO_FAST
+    {
+        let message = format!(
+            "weights that fall with the distance as d^{power} hold no particle: they are no material"
+        );
+        return Err(scene.refuse(
+            "rule.mean.power",
+            message,
+            "use one above -2; those up to -1 are unstable",
+        ));
+    }
     let (crystal, divisors) = about_rest(scene)?;
     let mut report = MaterialReport::of_rule_over(&scene.lattice, rule_name(scene), &crystal, &divisors)
         .map_err(|error| scene.refuse("neighbours", error.to_string(), remedy(&error)))?;
@@ -131,6 +143,9 @@ fn scalar_crystal(scene: &Scene) -> Result<Crystal, SceneError> {
         .map_err(|error| scene.refuse("rule.weights", error.to_string(), remedy(&error)))
 }
 
+/// Power of the distance at and below which its weights let a chain run together: its shortest wave changes by `-1 - 2 p` at each step.
+const FALLS_TOO_FAST: f64 = -1.0;
+
 /// The rule for small displacements about rest, and what its update divides by on each sublattice.
 fn about_rest(scene: &Scene) -> Result<(Crystal, Vec<Block>), SceneError> {
     let scalar = scalar_crystal(scene)?;
@@ -212,6 +227,14 @@ pub(super) fn require_damped(scene: &Scene, gradient: &GradientWeights) -> Resul
 
 /// Warnings about a run from the waves of the scene's fixed weights.
 pub(crate) fn cautions(scene: &Scene) -> Vec<String> {
+    if let Mean::Distance { power } = scene.mean
+        && power <= FALLS_TOO_FAST
+    {
+        return vec![format!(
+            "weights that fall with the distance as d^{power} are unstable: particles run to their nearest neighbours in any update; use a \
+             rule.mean.power above {FALLS_TOO_FAST}"
+        )];
+    }
     // Rules that have no waves (not symmetric, say) are no error here.
     let Some((crystal, zone)) = waves_in_doubt(scene) else { return Vec::new() };
     let by_distance = matches!(scene.mean, Mean::Distance { .. });
@@ -221,13 +244,8 @@ pub(crate) fn cautions(scene: &Scene) -> Vec<String> {
         let length = std::f64::consts::TAU / zone.worst[0].hypot(zone.worst[1]);
         return vec![format!(
             "these weights are unstable: a wave of length {length:.4} {} costs nothing or gives energy and does not die out in any update; \
-             {}",
-            scene.unit(),
-            if by_distance {
-                "they fall with the distance too fast: use a greater rule.mean.power"
-            } else {
-                "weights of far neighbours are too negative (on a chain, w2 must be above -w1/4)"
-            }
+             weights of far neighbours are too negative (on a chain, w2 must be above -w1/4)",
+            scene.unit()
         )];
     }
     let limit = zone.damping_limit / over;
@@ -239,7 +257,7 @@ pub(crate) fn cautions(scene: &Scene) -> Vec<String> {
     }
     if scene.update.order == Order::Synchronous && damping > limit * (1.0 + 1e-9) {
         return vec![format!(
-            "a synchronous update of these weights diverges unless damped below {:.4}: set update.damping or use update.order = \"sequential\"",
+            "a synchronous update of these weights may diverge unless damped below {:.4}: set update.damping or use update.order = \"sequential\"",
             limit
         )];
     }

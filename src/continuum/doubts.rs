@@ -8,7 +8,9 @@ use crate::flock::body::Body;
 use crate::flock::fracture::{Ghosts, Threshold};
 use crate::flock::lattice::{Lattice, LatticeKind};
 use crate::flock::law::Flock;
+use crate::flock::neighbourhood::Neighbourhood;
 use crate::flock::role::Role;
+use crate::flock::rules::Mean;
 use crate::flock::vectors::{Vectors, distance};
 use crate::material::elastic::Elastic;
 use crate::scene::Scene;
@@ -101,16 +103,35 @@ fn lies_along(lattice: &Lattice, angle: f64) -> bool {
     are_rectangles && (2.0 * (y.atan2(x) - angle)).sin().abs() < 1e-6
 }
 
-/// Says that ghosts are not mirrored where no neighbour lies opposite.
+/// Says that ghosts are not mirrored where no neighbour lies opposite, and what mirrored ones do to means that are none of places.
 fn unmirrored(scene: &Scene) -> Option<String> {
     scene.fracture.filter(|fracture| fracture.ghosts == Ghosts::Mirrored)?;
     let is_honeycomb = matches!(scene.lattice.kind(), LatticeKind::Honeycomb { .. });
+    if matches!(scene.mean, Mean::Power { .. }) {
+        return Some(format!(
+            "fracture.ghosts = \"mirrored\" with a {}: an image moves with its particle, and the mean of a neighbour and its image is not \
+             their middle, so that a fragment may run away or turn inside out; use \"lattice\"",
+            scene.mean
+        ));
+    }
     let lacking = match scene.is_of_points() {
         true => "points have hardly any neighbours that lie opposite",
         false if is_honeycomb => "the nearest neighbours on a honeycomb do not lie opposite each other",
         false => return None,
     };
     Some(format!("{lacking}: fracture.ghosts = \"mirrored\" is \"lattice\" there"))
+}
+
+/// Says that a mean of all particles in range draws them together.
+fn contracting(scene: &Scene) -> Option<String> {
+    let is_anew = matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. });
+    let keeps = matches!(scene.mean, Mean::Spaced { .. } | Mean::Median | Mean::Material { .. });
+    (is_anew && !keeps).then(|| {
+        format!(
+            "the {} of all particles in range keeps no distance: the body contracts; use rule.mean.kind = \"spaced\"",
+            scene.mean
+        )
+    })
 }
 
 /// Names probed points of the frame; `any` says whether one of the ranks has found something.
@@ -127,10 +148,15 @@ fn framed_probes(scene: &Scene, body: &Body, any: impl Fn(bool) -> bool) -> Opti
     })
 }
 
+/// The warnings that the scene alone gives.
+fn of_rule(scene: &Scene) -> impl Iterator<Item = String> {
+    locking(scene).chain(unmirrored(scene)).chain(contracting(scene))
+}
+
 /// The warnings before a run.
 pub(crate) fn planned(scene: &Scene, setup: &Setup) -> Vec<String> {
     let Setup { body, flock, roles, changes, .. } = setup;
-    let mut cautions: Vec<String> = locking(scene).chain(unmirrored(scene)).collect();
+    let mut cautions: Vec<String> = of_rule(scene).collect();
     // A part does not see the others.
     if body.part.is_some() {
         return cautions;
@@ -148,7 +174,7 @@ pub(crate) fn seen(scene: &Scene, engine: &Engine) -> Vec<String> {
         Doubts::of(engine.body(), engine.flock(), engine.roles(), engine.present());
     let [followers, unmoved, long] = [followers, unmoved, long].map(|own| engine.count_of_parts(own));
     let mut cautions = Doubts { followers, unmoved, long }.cautions(scene);
-    cautions.extend(locking(scene).chain(unmirrored(scene)));
+    cautions.extend(of_rule(scene));
     cautions.extend(layout::roles::cautions(engine.changes(), engine.body(), engine.parted()));
     cautions.extend(framed_probes(scene, engine.body(), |own| engine.any_of_parts(own)));
     cautions

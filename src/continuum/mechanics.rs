@@ -245,12 +245,8 @@ impl Mechanics {
         let mut cautions = Vec::new();
         let is_material = matches!(engine.flock().rule.mean, Mean::Material { .. });
         let is_strained = self.largest_strain > SMALL_STRAIN;
-        let growth = (is_material && is_strained).then(|| growth(engine)).flatten();
-        match (growth, rotation(engine)) {
-            (Some(cause), _) => cautions.push(format!(
-                "strains of up to {}, and the sweep grows from step to step: {cause}",
-                percent(self.largest_strain)
-            )),
+        match (growing(engine, self.largest_strain), rotation(engine)) {
+            (Some(growing), _) => cautions.push(growing),
             (None, Rotation::Small) if is_material && (is_strained || self.largest_turn > SMALL_TURN) => {
                 cautions.push(format!(
                     "strains of up to {} and turns of up to {:.0} degrees under rotation = \"small\", which is right \
@@ -337,6 +333,12 @@ fn strain_energy(engine: &Engine, elastic: &Elastic, forces: Option<&Forces>, u:
     let over =
         Over { cells: cells.owned(body), particles: body.owned(), sum_of_cells: &sum_of_cells, sum: &sum };
     stress::strain_energy_over(cells, elastic, (u, rotation(engine)), &over).unwrap_or(f64::NAN)
+}
+
+/// The warning about a strained body whose sweep grows from step to step, if it does; found by all ranks together.
+pub(crate) fn growing(engine: &Engine, strain: f64) -> Option<String> {
+    let cause = (strain > SMALL_STRAIN).then(|| growth(engine)).flatten()?;
+    Some(format!("strains of up to {}, and the sweep grows from step to step: {cause}", percent(strain)))
 }
 
 /// Which turns of a cell are no strain.

@@ -262,8 +262,6 @@ impl Parting {
         let here = |columns: &Range<usize>| before(columns.start)..before(columns.end);
         let (total, whole) = (self.total(), self.extent);
         let (owned_here, exact_here) = (here(&owned), here(&exact));
-        debug_assert_eq!(owned_here.len(), self.particles(&owned));
-        debug_assert_eq!(exact_here.len(), self.particles(&exact));
         let first = self.before[owned.start] as usize - owned_here.start;
         let mut part = Part { first, total, owned: owned_here, exact: exact_here, whole, along: None };
         let fitted = self.fitted.as_deref();

@@ -88,7 +88,11 @@ impl PlanReport {
         self.models_or_not(frame, "frame", free);
         let rest =
             plan.setup.flock.rest.as_ref().map(|_| "rest offsets for unbalanced neighbourhoods".to_owned());
-        self.models_or_not(rest, "rule.rest", "every neighbourhood is balanced, or rule.rest is \"literal\"");
+        let no_rest = match plan.setup.present_radius {
+            Some(_) => "neighbours that are found anew have no reference to keep",
+            None => "every neighbourhood is balanced, or rule.rest is \"literal\"",
+        };
+        self.models_or_not(rest, "rule.rest", no_rest);
         let weights = match &plan.setup.flock.weights {
             Weights::Equal => None,
             Weights::Scalar(_) => Some(match scene.weights {
@@ -319,13 +323,7 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
             if scene.is_fitted { "a smaller spacing" } else { "body.outline = \"fitted\" or a smaller spacing" }
         ));
     }
-    let rule = plan.setup.flock.rule;
     let is_synchronous = plan.setup.update.order == Order::Synchronous;
-    if plan.setup.present_radius.is_some() && rule.mean == Mean::Barycentre {
-        cautions.push(
-            "the barycentre of all particles in range keeps no distance: the body contracts; use rule.mean.kind = \"spaced\"".into(),
-        );
-    }
     let of_waves = bulk_response::cautions(scene);
     let over = scene.over_relaxation();
     if of_waves.is_empty() && is_synchronous && over > 1.0 && plan.setup.update.damping * over > 1.0 {

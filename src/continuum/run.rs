@@ -9,6 +9,7 @@ use crate::engine::observer::{EachStep, Observer};
 use crate::engine::several::StepBatch;
 use crate::engine::shared::Agreed;
 use crate::engine::state::{EngineState, WrongState};
+use crate::flock::fracture::Ghosts;
 use crate::flock::law::Weights;
 use crate::flock::role::Role;
 use crate::flock::rules::{Axis, FeedbackReference, Mean};
@@ -265,6 +266,13 @@ fn divergence(engine: &Engine, movement: &Movement, bound: f64) -> Option<Diverg
 fn cause_in_sweep(engine: &Engine) -> Option<String> {
     let rule = engine.flock().rule;
     let damping = engine.update().damping;
+    let ghosts = engine.flock().bonds.as_ref().map(|bonds| bonds.ghosts);
+    if ghosts == Some(Ghosts::Mirrored) && matches!(rule.mean, Mean::Power { .. }) {
+        return Some(format!(
+            "mirror images move with their particle, away from the {} of neighbour and image; use fracture.ghosts = \"lattice\"",
+            rule.mean
+        ));
+    }
     let overshoot = rule.feedback.map(|f| (f.factor, f.reference));
     if let Some((factor, FeedbackReference::Initial)) =
         overshoot.filter(|(factor, _)| !(-2.0..=0.0).contains(factor))
@@ -307,6 +315,9 @@ fn cause_in_sweep(engine: &Engine) -> Option<String> {
             )
         });
     }
+    if matches!(rule.mean, Mean::Distance { power } if power <= -1.0) {
+        return Some("weights that fall with the distance draw each particle to its nearest neighbour; use a rule.mean.power above -1".into());
+    }
     if matches!(rule.mean, Mean::Distance { power } if power > 0.0) && is_synchronous {
         return Some("weights that grow with distance let the shortest waves of a synchronous update grow; use update.order = \"sequential\" or a smaller update.damping (`flockform material` computes the limit)".into());
     }
@@ -315,12 +326,17 @@ fn cause_in_sweep(engine: &Engine) -> Option<String> {
     are_of_both_signs.then(|| "weights of both signs; give weights that are not negative".into())
 }
 
-/// Why a sweep grows that has not diverged yet: its moves turn back, each farther than the last. `None` of others.
+/// Why a sweep grows that has not diverged yet: its moves are each farther than the last, and turn back, or no leader goes on. `None` of
+/// others.
 pub(super) fn growth(engine: &Engine) -> Option<String> {
     /// Of the squares of the moves, from one to the next \[1\].
     const GROWS: f64 = 1.01;
     let [along, next, last] = moves(engine);
-    (along < 0.0 && next > GROWS * last).then(|| cause_in_sweep(engine)).flatten()
+    let goes_on = |i: &usize| {
+        engine.roles()[*i] == Role::Leader && engine.present().get(*i) != engine.previous().get(*i)
+    };
+    let is_led = engine.count_of_parts(engine.body().owned().filter(goes_on).count()) > 0;
+    ((along < 0.0 || !is_led) && next > GROWS * last).then(|| cause_in_sweep(engine)).flatten()
 }
 
 /// Whether the followers' next moves go against their last ones: waves that grow from step to step change their sign at

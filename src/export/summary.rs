@@ -14,7 +14,7 @@ use crate::continuum::cuts;
 use crate::continuum::doubts;
 use crate::continuum::late;
 use crate::continuum::layout::regions::uneven_sides;
-use crate::continuum::mechanics::{Mechanics, Peak, Stresses, percent};
+use crate::continuum::mechanics::{Mechanics, Peak, Stresses, growing, percent};
 use crate::continuum::places::{AtPlace, at_places};
 use crate::continuum::report::{DEVIATES, dead_pressure, whole_cells};
 use crate::continuum::run::{Outcome, StopReason};
@@ -236,6 +236,7 @@ impl Summary {
         let [pe1, pe2] = engine.energies();
         let largest_strain = largest_strain(engine);
         let is_tied = ties_to_reference(scene);
+        let may_grow = measured.is_none() && !matches!(outcome.reason, StopReason::Diverged(_));
         let may_be_short = outcome.reason == StopReason::Equilibrium && (outcome.solved.is_none() || is_tied);
         let settled = measured.as_ref().filter(|_| may_be_short);
         let left = settled.and_then(|settled| settled.mechanics.short_of_rest(engine));
@@ -271,7 +272,8 @@ impl Summary {
             cautions: [balance, of_contrast(scene, &outcome.reason)]
                 .into_iter()
                 .flatten()
-                .chain(cautions(scene, engine, measured.as_ref()))
+                .chain(cautions(scene, outcome, measured.as_ref()))
+                .chain(growing(engine, largest_strain.unwrap_or(0.0)).filter(|_| may_grow))
                 .collect(),
             mechanics: measured,
             broken_bonds: broken_bonds(&outcome.engine),
@@ -291,7 +293,9 @@ impl Summary {
     }
 }
 
-fn cautions(scene: &Scene, engine: &Engine, measured: Option<&Measured>) -> Vec<String> {
+fn cautions(scene: &Scene, outcome: &Outcome, measured: Option<&Measured>) -> Vec<String> {
+    let engine = &outcome.engine;
+    let is_at_rest = outcome.reason == StopReason::Equilibrium;
     let of_forces = |measured: &Measured| {
         dead_pressure(scene)
             .into_iter()
@@ -302,7 +306,7 @@ fn cautions(scene: &Scene, engine: &Engine, measured: Option<&Measured>) -> Vec<
     };
     uneven_sides(scene)
         .into_iter()
-        .chain(bulk_response::cautions(scene))
+        .chain(bulk_response::cautions(scene).into_iter().filter(|_| !is_at_rest))
         .chain(late::cautions(scene))
         .chain(doubts::seen(scene, engine))
         .chain(cuts::made(scene, engine))

@@ -31,11 +31,12 @@ pub(super) fn read(stream: &mut TcpStream) -> io::Result<Asked> {
     let mut part = [0; 1024];
     while !head.windows(4).any(|four| four == b"\r\n\r\n") {
         let left = end.saturating_duration_since(Instant::now());
-        if left.is_zero() || head.len() > MOST_HEAD {
+        let room = part.len().min(MOST_HEAD - head.len());
+        if left.is_zero() || room == 0 {
             return Err(io::ErrorKind::InvalidData.into());
         }
         stream.set_read_timeout(Some(left))?;
-        match stream.read(&mut part)? {
+        match stream.read(&mut part[..room])? {
             0 => return Err(io::ErrorKind::UnexpectedEof.into()),
             count => head.extend_from_slice(&part[..count]),
         }

@@ -74,10 +74,9 @@ impl Crystal {
         }
         let lowest = climb(lowest, |phase| -self.cost(phase), -1.0);
         let top = climb(top, growth, 1.0);
-        let diagonals = (0..self.bonds.len()).map(|s| self.diagonal(s));
         // Springs of stiffness 1 along two axes have 4 on the diagonal.
-        let least =
-            lowest.0 * 8.0 * self.bonds.len() as f64 / diagonals.map(|d| d[0][0] + d[1][1]).sum::<f64>();
+        let least = lowest.0 * 8.0 * self.bonds.len() as f64
+            / divisors.iter().map(|d| d[0][0] + d[1][1]).sum::<f64>();
         Ok(Zone {
             stable: least > FREE,
             least,

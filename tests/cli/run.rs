@@ -521,6 +521,56 @@ fn keys_of_steps_that_an_equilibrium_does_not_take_are_warned_of_by_the_plan_and
     assert!(!done(&["plan", "bar"], folder.path()).contains("without effect"));
 }
 
+/// What `run` alone says of a bundled scene with these keys set.
+fn said_by_run(scene: &str, set: &[&str]) -> String {
+    let set: Vec<&str> = set.iter().flat_map(|text| ["--set", *text]).collect();
+    let folder = temporary();
+    let run = ["run", scene, "--no-report", "--figures", "none", "--out", "o"];
+    done(&[&run, &set[..]].concat(), folder.path())
+}
+
+#[test]
+fn means_that_run_away_are_warned_of_by_the_plan_and_the_run() {
+    let torn = [
+        "rule.mean={ kind = \"geometric\" }",
+        "fracture={ stretch = 5.0, ghosts = \"mirrored\" }",
+        "stop.steps=5",
+        "frame=\"none\"",
+        "record.probes=[]",
+    ];
+    let anew = [
+        "neighbours={ kind = \"dynamic\", radius = 1.5 }",
+        "frame=\"none\"",
+        "record.probes=[]",
+        "stop.steps=5",
+    ];
+    for (set, words) in [
+        (&torn[..], "fracture.ghosts = \"mirrored\" with a geometric mean"),
+        (&anew[..], "of all particles in range keeps no distance"),
+    ] {
+        let set: Vec<&str> = set.iter().flat_map(|text| ["--set", *text]).collect();
+        for said in said_by_plan_and_run("tension", &set, temporary().path()) {
+            assert!(said.contains(words), "{said}");
+        }
+    }
+}
+
+#[test]
+fn a_sweep_that_grows_is_warned_of_before_it_diverges_and_one_that_rests_is_not() {
+    let grown = ["rule.feedback={ factor = 0.2 }", "stop.steps=45", "frame=\"none\"", "record.probes=[]"];
+    let said = said_by_run("tension", &grown);
+    assert!(said.contains("the sweep grows from step to step: feedback factor 0.2"), "{said}");
+    let at_rest = [
+        "rule.feedback={ factor = 0.002, reference = \"previous\" }",
+        "stop={ steps = 20000, tolerance = 1e-9 }",
+        "frame=\"none\"",
+        "record.probes=[]",
+    ];
+    let said = said_by_run("tension", &at_rest);
+    assert!(said.contains("in equilibrium") && !said.contains("diverge"), "{said}");
+    assert!(!said_by_run("tension", &["frame=\"none\"", "record.probes=[]"]).contains("grows"));
+}
+
 #[test]
 fn cuts_that_miss_the_body_are_warned_of_by_the_plan_and_the_run() {
     let folder = temporary();

@@ -63,14 +63,35 @@ pub(crate) fn requested(control: &Control, request: &SetFormationRequest) -> Res
     if duration <= 0.0 {
         return Err(format!("duration = {} s: give a positive one", number(duration)));
     }
-    if stretch[0] * stretch[1] == shear[0] * shear[1] {
-        return Err("stretch and shear would collapse the formation onto one line or point".into());
-    }
     let about = control.formation().middle();
     let posture = Posture { translate, rotate, stretch, shear };
     let from = control.formation().posture(about, time);
+    if collapses(&from, &posture) {
+        return Err(
+            "stretch and shear would collapse the formation onto one line or point, there or on the way"
+                .into(),
+        );
+    }
     let leg = Leg { seconds: duration, hold: 0.0, posture };
     Ok(Manoeuvre { about, from, legs: vec![leg] })
+}
+
+/// Whether a formation that goes evenly from one posture to another has no area at some moment after the first.
+fn collapses(from: &Posture, to: &Posture) -> bool {
+    let between = |share: f64| {
+        let part = |from: f64, to: f64| from + share * (to - from);
+        let [x, y] = [0, 1].map(|k| part(from.stretch[k], to.stretch[k]));
+        let [right, up] = [0, 1].map(|k| part(from.shear[k], to.shear[k]));
+        x * y - right * up
+    };
+    // It is a quadratic of the share: of one sign if it is so at both ends and where it turns.
+    let [begin, middle, end] = [0.0, 0.5, 1.0].map(between);
+    let bend = 2.0 * (begin - 2.0 * middle + end);
+    let turn = (begin - end + bend) / (2.0 * bend);
+    let turn = if (0.0..=1.0).contains(&turn) { between(turn) } else { end };
+    // A share of rounding.
+    let least = 1e-12 * (end.abs() + begin.abs());
+    [turn, end].iter().any(|area| area.abs() <= least || area.signum() != begin.signum())
 }
 
 /// Moments of a leg whose places are looked at.
@@ -204,6 +225,30 @@ mod tests {
         let posture = control.formation().posture([0.0, 2.0], 6.0);
         let translate = [4.0 - 2.0 * turn.sin(), 2.0 * turn.cos() - 2.0];
         assert!(distance(posture.translate, translate) < 1e-12 && posture.rotate == turn, "{posture:?}");
+    }
+
+    #[test]
+    fn a_formation_is_not_led_through_its_collapse() {
+        let swarm = bundled_swarm("square").expect("bundled").load_swarm(&[]).expect("loads");
+        let mut control = Control::new(&swarm).expect("laid out");
+        let mut ask = |stretch: [f64; 2], shear: [f64; 2]| {
+            let request =
+                SetFormationRequest { stretch, shear, duration: 600.0, ..SetFormationRequest::default() };
+            set_formation(&mut control, &request)
+        };
+        for (stretch, shear) in [
+            ([0.0, 1.0], [0.0; 2]),
+            ([1.0, 1.0], [1.0, 1.0]),
+            ([-1.0, 1.0], [0.0; 2]),
+            ([-1.0, -1.0], [0.0; 2]),
+            ([-1.0, -2.0], [0.0; 2]),
+        ] {
+            let refused = ask(stretch, shear).expect_err("collapses");
+            assert!(refused.contains("would collapse"), "{stretch:?} {shear:?}: {refused}");
+        }
+        for (stretch, shear) in [([1.5, 0.5], [0.3, 0.0]), ([0.1, 0.1], [0.0; 2]), ([1.0, 1.0], [0.9, 0.9])] {
+            ask(stretch, shear).expect("can be flown");
+        }
     }
 
     #[test]

@@ -11,7 +11,7 @@ pub enum RawNeighbours {
     /// centred rectangular, hexagonal and oblique 6, honeycomb 3).
     First {
         /// Keeps only this many, dropping from the end of: nearest first; equally near ones in
-        /// opposite pairs by angle (east, west, north, south) [1].
+        /// opposite pairs by angle (east, west, north, south of the lattice as it is before it is turned) [1].
         #[schemars(range(min = 1))]
         keep: Option<usize>,
     },
@@ -170,7 +170,7 @@ pub enum RawWeights {
 #[serde(rename_all = "kebab-case")]
 pub enum RawRest {
     /// Each particle adds the offset that keeps it in place while its neighbours are in theirs. Zero
-    /// for a complete neighbourhood.
+    /// for a complete neighbourhood; neighbours that are found anew at every step have none.
     #[default]
     Balanced,
     /// The formula alone: a body with missing or unbalanced neighbours draws together.

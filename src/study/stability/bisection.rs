@@ -41,7 +41,7 @@ impl Effort {
 pub struct Growth {
     /// Value of the parameter.
     pub value: f64,
-    /// Factor by which the followers' displacements grew per step over the last part of the run \[1\].
+    /// Factor by which the followers' displacements, from where they are undisturbed, grew per step over the last part of the run \[1\].
     pub per_step: f64,
     /// Steps of the run.
     pub steps: usize,
@@ -80,11 +80,21 @@ pub fn growth(subject: &Subject, parameter: Parameter, value: f64, most_steps: u
     let push = |k: usize| if follows(k / 2) { 0.25 * spacing * scatter(k as u64) } else { 0.0 };
     let disturbed: Vectors = (0..subject.particles()).map(|i| [push(2 * i), push(2 * i + 1)]).collect();
     engine.place_at_rest(0, &disturbed);
+    // A body of which the reference is not a state of rest goes where it comes to rest, disturbed or not.
+    let mut undisturbed = Some(subject.engine()).filter(|_| {
+        let mut engine = subject.engine();
+        engine.advance();
+        *engine.present() != *engine.body().reference
+    });
     let mut sizes = vec![size(engine.present(), &engine.body().reference, spacing)];
     let mut settled = false;
     while sizes.len() <= most_steps && !settled {
         engine.advance();
-        let now = size(engine.present(), &engine.body().reference, spacing);
+        let still = undisturbed.as_mut().map_or(&*engine.body().reference, |undisturbed| {
+            undisturbed.advance();
+            undisturbed.present()
+        });
+        let now = size(engine.present(), still, spacing);
         sizes.push(now);
         let gone = !(now < FAR * sizes[0] && now > sizes[0] / FAR);
         // A mode that grows may begin small: what shrinks must have shrunk, or have had the time.
@@ -95,7 +105,7 @@ pub fn growth(subject: &Subject, parameter: Parameter, value: f64, most_steps: u
     Growth { value, per_step: factor(&sizes, steps, part(steps)), steps, settled }
 }
 
-/// Root of the mean square displacement over the spacing.
+/// Root of the mean square displacement from other places over the spacing.
 fn size(present: &Vectors, reference: &Vectors, spacing: f64) -> f64 {
     let apart = |(p, r): ([f64; 2], [f64; 2])| {
         let [x, y] = [(p[0] - r[0]) / spacing, (p[1] - r[1]) / spacing];

@@ -28,12 +28,15 @@ fn apart(places: &Vectors, i: usize, k: u32) -> f64 {
     distance(places.get(i), places.get(k as usize))
 }
 
+/// Part of a distance within which two are equal: places are given to a few digits.
+const EQUAL: f64 = 1e-4;
+
 /// The `count` nearest, and all as near as the last of them.
 fn nearest(places: &Vectors, i: usize, count: usize) -> Vec<u32> {
     let mut distances: Vec<f64> = others(places, i).map(|k| apart(places, i, k)).collect();
     distances.sort_unstable_by(f64::total_cmp);
     let Some(&last) = distances.get(count.min(distances.len()).wrapping_sub(1)) else { return Vec::new() };
-    let as_near = last * (1.0 + 1e-9);
+    let as_near = last * (1.0 + EQUAL);
     others(places, i).filter(|&k| apart(places, i, k) <= as_near).collect()
 }
 

@@ -20,6 +20,16 @@ struct MotionRequest {
     reach: f64,
 }
 
+/// Where a member's step begins, in the cell that is built around that place.
+struct Outset {
+    /// \[m, world frame\]
+    here: [f64; 2],
+    /// The velocity that a limit of acceleration holds it to \[m/s\]; `None` where none does, or the cell comes first.
+    velocity: Option<[f64; 2]>,
+    request: MotionRequest,
+    origins: Origins,
+}
+
 /// The origins of a cell's planes, by their index: first members, then obstacles, then the fence.
 #[derive(Clone, Copy)]
 struct Origins {
@@ -52,26 +62,10 @@ impl Filter {
             return ([pose; 2], Flags(Flags::HELD));
         }
         let brakes = self.crowd.brakes;
-        let (from, most) = self.place(seen, period, member);
-        let (mut here, mut way) = (from, minus(wanted, from));
-        let mut velocity = self.motion(seen, period, member);
-        let mut request = self.request(velocity, way, period, most);
-        let mut origins = self.enclose(seen, &mut request, here, member);
-        let whole = self.limits.speed * period;
-        let lag = distance(pose, here);
-        if self.cell.excess([0.0; 2]) > TOUCHING * lag && lag > 0.0 {
-            // Where it was sent is no longer its own: it goes back into its cell, or is not waited for, at any acceleration.
-            velocity = None;
-            // No point that is nearest to the wanted one is farther, if its pose is in the cell.
-            let reach = whole.min(2.0 * length(way) + lag);
-            request = MotionRequest { reach, ..self.request(None, way, period, whole) };
-            origins = self.enclose(seen, &mut request, here, member);
-            if self.cell.is_empty(request.reach) {
-                (here, way) = (pose, minus(wanted, pose));
-                request = self.request(None, way, period, self.most_from_pose(seen, period, member));
-                origins = self.enclose(seen, &mut request, here, member);
-            }
-        }
+        let place = self.place(seen, period, member);
+        let Outset { here, velocity, mut request, origins } =
+            self.set_out(seen, wanted, place, period, member);
+        let way = request.way;
         let open = shortened(way, request.reach);
         let mut flags = self.why(open, origins);
         if velocity.is_some() && !brakes {
@@ -94,7 +88,7 @@ impl Filter {
             None => shortened(goal, request.step),
         };
         let step = if brakes { step } else { self.unmoved_by_noise(here, step, &request, member) };
-        let step = if here == from { step } else { self.within_speed(step, minus(from, here), whole) };
+        let step = if here == place.0 { step } else { self.within_speed(step, minus(place.0, here), period) };
         let step = self.cast(here, step, origins, member);
         if request.distance > request.step {
             flags.0 |= Flags::SPEED_LIMITED;
@@ -102,6 +96,39 @@ impl Filter {
         // An unchanged way gives the wanted target to the last bit.
         let target = if step == way { wanted } else { plus(here, step) };
         ([here, target], flags)
+    }
+
+    /// What the member's step begins with, from a place \[m, world frame\] or, where that is not in its cell, into that: as far as it may
+    /// be sent from there \[m\], or from its pose.
+    fn set_out(
+        &mut self,
+        seen: &Seen,
+        wanted: [f64; 2],
+        (here, most): ([f64; 2], f64),
+        period: f64,
+        member: usize,
+    ) -> Outset {
+        let (pose, way) = (seen.present.get(member), minus(wanted, here));
+        let velocity = self.motion(seen, period, member);
+        let mut request = self.request(velocity, way, period, most);
+        let origins = self.enclose(seen, &mut request, here, member);
+        let lag = distance(pose, here);
+        if lag == 0.0 || self.cell.excess([0.0; 2]) <= TOUCHING * lag {
+            return Outset { here, velocity, request, origins };
+        }
+        // Where it was sent is no longer its own: it goes back into its cell, or is not waited for, at any acceleration.
+        let whole = self.limits.speed * period;
+        // No point that is nearest to the wanted one is farther, if its pose is in the cell.
+        let reach = whole.min(2.0 * length(way) + lag);
+        let mut request = MotionRequest { reach, ..self.request(None, way, period, whole) };
+        let origins = self.enclose(seen, &mut request, here, member);
+        if !self.cell.is_empty(request.reach) {
+            return Outset { here, velocity: None, request, origins };
+        }
+        let most = self.most_from_pose(seen, period, member);
+        let mut request = self.request(None, minus(wanted, pose), period, most);
+        let origins = self.enclose(seen, &mut request, pose, member);
+        Outset { here: pose, velocity: None, request, origins }
     }
 
     /// The place from which a member is sent on \[m, world frame\], and how far it may be sent from there \[m\]: that of its pose, or,
@@ -319,8 +346,8 @@ impl Filter {
 
     /// The step, or less of the way to its end from where the member was sent, relative to its pose \[m\]: that is the way that it makes.
     /// One that lags need not have the cell in which that place was.
-    fn within_speed(&self, step: [f64; 2], from: [f64; 2], most: f64) -> [f64; 2] {
-        let way = minus(step, from);
+    fn within_speed(&self, step: [f64; 2], from: [f64; 2], period: f64) -> [f64; 2] {
+        let (way, most) = (minus(step, from), self.limits.speed * period);
         let on = shortened(way, most);
         if on == way {
             return step;

@@ -111,7 +111,7 @@ pub struct RawRobot {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum RawLinks {
-    /// The nearest in the formation; of equally near ones all.
+    /// The nearest in the formation; of equally near ones, to a ten-thousandth, all.
     Nearest {
         /// Neighbours of each robot [1].
         #[schemars(range(min = 1))]
