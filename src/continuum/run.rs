@@ -315,7 +315,7 @@ fn cause_in_sweep(engine: &Engine) -> Option<String> {
             )
         });
     }
-    if matches!(rule.mean, Mean::Distance { power } if power <= -1.0) {
+    if matches!(rule.mean, Mean::Distance { power } if power < -1.0) {
         return Some("weights that fall with the distance draw each particle to its nearest neighbour; use a rule.mean.power above -1".into());
     }
     if matches!(rule.mean, Mean::Distance { power } if power > 0.0) && is_synchronous {

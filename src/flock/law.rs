@@ -246,25 +246,29 @@ impl Flock {
 
     /// Target position of `particle` by those of its neighbours alone that `keeps` names: the others are unknown
     /// or not believed. Those that are left take over the share of the others, so that the reference
-    /// configuration stays at rest; `None` where too few are left to determine a target. Of numbers of both signs the sizes are
-    /// the shares then: what is left of such weights may add up to next to nothing, over which each move would be that much larger.
+    /// configuration stays at rest; `None` where too few are left to determine a target. They have these weights instead of their own,
+    /// if there are any, one for each neighbour. Otherwise of numbers of both signs the sizes are the shares: what is left of such
+    /// weights may add up to next to nothing, over which each move would be that much larger.
     pub fn target_among(
         &self,
         particle: usize,
         present: &Vectors,
         keeps: impl Fn(usize) -> bool + Clone,
+        instead: Option<&[f64]>,
     ) -> Option<[f64; 2]> {
         let are_all = self.neighbours.of(particle).iter().all(|&k| keeps(k as usize));
         let kept = |points| {
             let keeps = keeps.clone();
+            let weighted = move |slot: usize, near: Neighbour| {
+                let weight =
+                    instead.map_or(if are_all { near.weight } else { near.weight.abs() }, |one| one[slot]);
+                Neighbour { weight, ..near }
+            };
             self.seen(particle, points)
                 .zip(self.neighbours.of(particle))
-                .filter(move |&(_, &k)| keeps(k as usize))
-                .map(
-                    move |(near, _)| {
-                        if are_all { near } else { Neighbour { weight: near.weight.abs(), ..near } }
-                    },
-                )
+                .enumerate()
+                .filter(move |&(_, (_, &k))| keeps(k as usize))
+                .map(move |(slot, (near, _))| weighted(slot, near))
         };
         kept(present).next()?;
         if let (COROTATED, Weights::Matrix(weights)) = (self.rule.mean, &self.weights) {

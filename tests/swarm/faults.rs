@@ -288,6 +288,26 @@ fn a_dead_robot_sends_no_other_away_where_weights_are_below_zero() {
     }
 }
 
+/// The formation turns by 90 degrees while a robot lies behind: whoever stood beside it has its place by those that are left.
+#[test]
+fn neighbours_that_are_left_keep_the_places_of_an_affine_formation() {
+    for dead in [6, 12, 13] {
+        let fault = format!(
+            "flight.faults=[{{ robot = \"robot_{}\", at = 2.0, what = {{ kind = \"dead\" }} }}]",
+            dead + 1
+        );
+        // Those that pass the dead one may touch it.
+        let set = ["limits={ speed = 1.0 }", "flight.bounds={}", &fault];
+        let mut flight = Flight::new(&load_swarm("square", &set)).unwrap_or_else(|error| panic!("{error}"));
+        let mut worst = 0.0_f64;
+        while flight.fleet().time() < 40.0 {
+            flight.step();
+            worst = worst.max(worst_but(&flight, dead));
+        }
+        assert!(worst < 1e-9, "{dead}: {worst} m");
+    }
+}
+
 #[test]
 fn weights_below_zero_cannot_leave_out_liars() {
     let overrides = [

@@ -36,7 +36,7 @@ fn a_target_among_all_neighbours_is_the_target() {
     let mut scalar = Flock { rule: Rule::BARYCENTRE, weights, forces: None, ..material };
     scalar.keep_rest();
     for i in 0..3 {
-        let target = scalar.target_among(i, &present, |_| true).expect("has neighbours");
+        let target = scalar.target_among(i, &present, |_| true, None).expect("has neighbours");
         assert_eq!(target.map(f64::to_bits), scalar.target(i, &present).map(f64::to_bits));
     }
 }
@@ -53,7 +53,7 @@ fn weights_of_both_signs_that_are_left_do_not_magnify_what_the_neighbours_do() {
         ..material
     };
     flock.keep_rest();
-    let target = flock.target_among(0, &present, |k| k != 0).expect("two are left");
+    let target = flock.target_among(0, &present, |k| k != 0, None).expect("two are left");
     let moved = |k: usize| [0, 1].map(|axis| present.get(k)[axis] - flock.reference.get(k)[axis]);
     for axis in [0, 1] {
         let mean = (1.05 * moved(1)[axis] + moved(2)[axis]) / 2.05;
@@ -70,11 +70,11 @@ fn losing_a_neighbour_leaves_the_particle_at_rest() {
     scalar.keep_rest();
     for flock in [&material, &scalar] {
         let reference = &flock.reference;
-        let here = flock.target_among(0, reference, |k| k != 2).expect("one is left");
+        let here = flock.target_among(0, reference, |k| k != 2, None).expect("one is left");
         assert!(crate::flock::vectors::distance(here, reference.get(0)) < 1e-15, "{here:?}");
-        assert_eq!(flock.target_among(0, reference, |_| false), None);
+        assert_eq!(flock.target_among(0, reference, |_| false, None), None);
         // The one that is left is followed wherever it goes.
-        let target = flock.target_among(0, &present, |k| k == 1).expect("one is left");
+        let target = flock.target_among(0, &present, |k| k == 1, None).expect("one is left");
         let moved = [0, 1].map(|axis| target[axis] - reference.get(0)[axis]);
         let led = [0, 1].map(|axis| present.get(1)[axis] - reference.get(1)[axis]);
         assert!(crate::flock::vectors::distance(moved, led) < 1e-15, "{moved:?} {led:?}");

@@ -17,8 +17,9 @@ mod nearest;
 use crate::flock::law::{Flock, Weights};
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::role::Role;
-use crate::flock::rules::Rule;
+use crate::flock::rules::{Mean, Rule};
 use crate::flock::vectors::Vectors;
+use crate::geometry::point::{minus, plus};
 use crate::solve::spectrum::{LinearSweep, SpectralRadius};
 use crate::sweep::Update;
 use nearest::{Unreachable, nearest};
@@ -100,6 +101,9 @@ impl WeightsError {
 /// Sum of the weights' moduli up to which they are of use.
 const MOST_AMPLIFICATION: f64 = 1000.0;
 
+/// Part of the spread of its neighbours to which weights reproduce a place \[1\].
+const REPRODUCED: f64 = 1e-9;
+
 /// Weights of every follower for the nominal places `reference` \[m\], shape \[count\]. Sums and places are
 /// met to 1e-12 of the distance to the farthest neighbour, or to a few units in the last place of the
 /// coordinates where those are coarser.
@@ -122,6 +126,28 @@ pub fn solve(reference: &Vectors, neighbours: &Neighbours, follows: &[bool]) -> 
         solved.weights.extend(weights);
     }
     Ok(solved)
+}
+
+/// Weights of the neighbours that are left of a particle, one for each neighbour, where those of all reproduce its place in the
+/// reference and those of some can: of these the nearest to equal ones, none of them negative. `None` where there are none.
+pub fn of_those_left(flock: &Flock, particle: usize, is_left: impl Fn(usize) -> bool) -> Option<Vec<f64>> {
+    let (Weights::Scalar(weights), Mean::Barycentre) = (&flock.weights, flock.rule.mean) else { return None };
+    let (near, own) = (flock.neighbours.of(particle), flock.reference.get(particle));
+    let offsets: Vec<[f64; 2]> = near.iter().map(|&k| minus(flock.reference.get(k as usize), own)).collect();
+    let spread = offsets.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let weighted = || flock.neighbours.bonds(particle).map(|bond| weights[bond]).zip(&offsets);
+    let moment = weighted().fold([0.0; 2], |sum, (weight, at)| plus(sum, at.map(|x| weight * x)));
+    let sum: f64 = weighted().map(|(weight, _)| weight).sum();
+    if !(moment.iter().all(|x| x.abs() <= REPRODUCED * spread * sum.abs())) {
+        return None;
+    }
+    let slots: Vec<usize> = (0..near.len()).filter(|&slot| is_left(near[slot] as usize)).collect();
+    let left: Vec<[f64; 2]> = slots.iter().map(|&slot| offsets[slot]).collect();
+    let largest = own.iter().fold(spread, |most, x| most.max(x.abs()));
+    let found = (!left.is_empty()).then(|| nearest(&left, largest).ok()).flatten()?;
+    let mut all = vec![0.0; near.len()];
+    slots.iter().zip(&found).for_each(|(&slot, &weight)| all[slot] = weight);
+    found.iter().all(|&weight| weight >= 0.0).then_some(all)
 }
 
 fn weights_of(member: usize, reference: &Vectors, neighbours: &Neighbours) -> Result<Vec<f64>, WeightsError> {

@@ -49,6 +49,33 @@ fn scattered(count: u64, seed: u64, origin: [f64; 2]) -> Vectors {
 }
 
 #[test]
+fn those_left_around_a_particle_have_its_place_and_those_beside_it_alone_have_none() {
+    let around = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [1.0, 1.0]];
+    let places: Vectors = [[0.0; 2]].into_iter().chain(around).collect();
+    let neighbours = Neighbours::from_lists([vec![1, 2, 3, 4, 5], vec![], vec![], vec![], vec![], vec![]]);
+    let mut solved = weights_of(0, &places, &neighbours).expect("solved");
+    let flock = |weights: &[f64]| {
+        let weights = Weights::Scalar(weights.to_vec());
+        Flock::new(Rule::BARYCENTRE, places.clone().into(), neighbours.clone(), weights)
+    };
+    let left = |lost: &[usize]| of_those_left(&flock(&solved), 0, |k| !lost.contains(&k));
+    for lost in [&[5][..], &[2, 4, 5], &[1]] {
+        let weights = left(lost).expect("around it");
+        let are_gone = lost.iter().all(|&k| weights[k - 1] == 0.0);
+        assert!(are_gone && weights.iter().all(|&w| w >= 0.0), "{weights:?}");
+        let sum =
+            |of: &dyn Fn([f64; 2]) -> f64| weights.iter().zip(around).map(|(w, at)| w * of(at)).sum::<f64>();
+        let off = [sum(&|_| 1.0) - 1.0, sum(&|[x, _]| x), sum(&|[_, y]| y)];
+        assert!(off.iter().all(|x| x.abs() < 1e-12), "{lost:?}: {off:?}");
+    }
+    assert_eq!(left(&[2, 3]), None, "it lies beside them");
+    assert_eq!(left(&[1, 2, 3, 4, 5]), None);
+    // Weights that do not reproduce its place need not.
+    solved.fill(1.0);
+    assert_eq!(of_those_left(&flock(&solved), 0, |k| k != 1), None);
+}
+
+#[test]
 fn every_member_of_every_lattice_s_patch_reproduces_its_place() {
     for kind in LatticeKind::SAMPLES {
         for origin in [[0.0, 0.0], [1e6, -1e6]] {

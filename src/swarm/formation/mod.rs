@@ -25,6 +25,7 @@ use crate::flock::strain::{Strain, strain};
 use crate::flock::vectors::{Vectors, distance};
 use crate::geometry::point::{minus, plus};
 use crate::scene::swarm::NamedManoeuvre;
+use crate::solve::affine_weights;
 use crate::swarm::resilience::{Trim, supported, trim};
 use crate::sweep::Order;
 pub(in crate::swarm) use checks::first_few;
@@ -153,7 +154,11 @@ impl Formation {
         let seen = || near.iter().filter(|k| is_seen(k)).copied();
         let heard = seen().filter_map(member_of).collect();
         let points = seen().filter(|&k| liars == 0 && member_of(k).is_none()).collect();
-        Some(Among { member, is_one_lost, is_trimmed: false, heard, points, liars })
+        let is_left = |k: usize| is_seen(&(k as u32));
+        let weights = (liars == 0)
+            .then(|| affine_weights::of_those_left(engine.flock(), particles[member], is_left))
+            .flatten();
+        Some(Among { member, is_one_lost, is_trimmed: false, heard, points, liars, weights })
     }
 
     /// Members whose positions the member's target depends on.
@@ -495,6 +500,8 @@ pub struct Among {
     /// The points of the frame that it looks at, of those that are heard alone. A liar would have a vote more with each point that
     /// copies it: where liars are tolerated there are none.
     points: Vec<u32>,
+    /// Of all its neighbours, where those heard can go on to keep its place in the formation.
+    weights: Option<Vec<f64>>,
     /// Of the neighbours heard, the liars tolerated: it leaves out as many of those that stray farthest from it.
     liars: usize,
 }
@@ -517,7 +524,7 @@ impl Among {
                 Ok(m) => self.heard.iter().zip(&keep).any(|(&heard, keep)| heard == m && keep[axis]),
                 Err(_) => self.points.contains(&(i as u32)),
             };
-            let target = flock.target_among(particle, before, counts);
+            let target = flock.target_among(particle, before, counts, self.weights.as_deref());
             target.map_or(here[axis], |to| here[axis] + engine.update().damping * (to[axis] - here[axis]))
         });
         (target, keep.iter().any(|keep| *keep != [true; 2]))
