@@ -17,6 +17,7 @@ use crate::flock::vectors::{Vectors, distance};
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm as File;
 use crate::scene::swarm::raw::{RawCommand, RawCommandKind, RawFault, RawFaultKind};
+use crate::scene::text::listed;
 use crate::swarm::control::Control;
 use crate::swarm::design::{self, Edit};
 use crate::swarm::flight::{Alarm, Flight, FlightCommand};
@@ -29,7 +30,6 @@ pub(crate) const CHANNELS: [&str; 9] =
 /// Keys of the flight that may change while robots fly: noise, delay and loss.
 const CHANNEL_KEYS: [&str; 3] = ["flight.noise", "flight.delay", "flight.loss"];
 /// Robots that an alarm names; the page marks all of them.
-const MOST_NAMED: usize = 3;
 /// Most commands and faults that are kept.
 const MOST_COMMANDS: usize = 100_000;
 
@@ -395,16 +395,6 @@ pub(super) fn in_words(alarms: &[Alarm], names: &[String]) -> (Vec<String>, Vec<
     };
     let robots = alarms.iter().flat_map(|alarm| alarm.robots.iter().copied());
     (alarms.iter().map(words).collect(), robots.collect())
-}
-
-/// "a", "a, b and c", "a, b, c and 4 more".
-fn listed(names: &[&str]) -> String {
-    let (named, others) = names.split_at(names.len().min(MOST_NAMED));
-    match named {
-        _ if !others.is_empty() => format!("{} and {} more", named.join(", "), others.len()),
-        [before @ .., last] if !before.is_empty() => format!("{} and {last}", before.join(", ")),
-        _ => named.concat(),
-    }
 }
 
 impl history::State for State {

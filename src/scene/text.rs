@@ -37,6 +37,18 @@ pub fn percent(part: f64) -> String {
     format!("{} %", (100.0 * part) as f32)
 }
 
+/// "a", "a, b and c", "a, b, c and 4 more".
+pub(crate) fn listed(names: &[impl AsRef<str>]) -> String {
+    const MOST_NAMED: usize = 3;
+    let names: Vec<&str> = names.iter().map(AsRef::as_ref).collect();
+    let (named, others) = names.split_at(names.len().min(MOST_NAMED));
+    match named {
+        _ if !others.is_empty() => format!("{} and {} more", named.join(", "), others.len()),
+        [before @ .., last] if !before.is_empty() => format!("{} and {last}", before.join(", ")),
+        _ => named.concat(),
+    }
+}
+
 /// The text of a file of at most one GiB, so that a device without end, or another program's data, is refused and
 /// does not fill the memory.
 ///

@@ -131,13 +131,20 @@ pub fn solve(reference: &Vectors, neighbours: &Neighbours, follows: &[bool]) -> 
 /// Weights of the neighbours that are left of a particle, one for each neighbour, where those of all reproduce its place in the
 /// reference and those of some can: of these the nearest to equal ones, none of them negative. `None` where there are none.
 pub fn of_those_left(flock: &Flock, particle: usize, is_left: impl Fn(usize) -> bool) -> Option<Vec<f64>> {
-    let (Weights::Scalar(weights), Mean::Barycentre) = (&flock.weights, flock.rule.mean) else { return None };
+    let weight = |bond: usize| match &flock.weights {
+        Weights::Equal => Some(1.0),
+        Weights::Scalar(weights) => Some(weights[bond]),
+        Weights::Matrix(_) => None,
+    };
+    let bonds = flock.neighbours.bonds(particle);
+    let weights: Vec<f64> =
+        bonds.map(weight).collect::<Option<_>>().filter(|_| flock.rule.mean == Mean::Barycentre)?;
     let (near, own) = (flock.neighbours.of(particle), flock.reference.get(particle));
     let offsets: Vec<[f64; 2]> = near.iter().map(|&k| minus(flock.reference.get(k as usize), own)).collect();
     let spread = offsets.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
-    let weighted = || flock.neighbours.bonds(particle).map(|bond| weights[bond]).zip(&offsets);
-    let moment = weighted().fold([0.0; 2], |sum, (weight, at)| plus(sum, at.map(|x| weight * x)));
-    let sum: f64 = weighted().map(|(weight, _)| weight).sum();
+    let moments = weights.iter().zip(&offsets).map(|(weight, at)| at.map(|x| weight * x));
+    let moment = moments.fold([0.0; 2], plus);
+    let sum: f64 = weights.iter().sum();
     if !(moment.iter().all(|x| x.abs() <= REPRODUCED * spread * sum.abs())) {
         return None;
     }

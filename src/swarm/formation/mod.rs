@@ -141,6 +141,11 @@ impl Formation {
         matches!(&self.course, TargetSource::Rule { engine, .. } if engine.update().order == Order::Synchronous)
     }
 
+    /// Whether a follower whose neighbours reproduce its place has it by those alone that are heard.
+    pub(in crate::swarm) fn keeps_place(&self, member: usize, is_heard: &[bool]) -> bool {
+        self.among(member, is_heard, 0).is_none_or(|among| among.weights.is_some())
+    }
+
     /// What a follower goes by where it leaves some of its neighbours out; `None` if it goes by all that it looks at.
     pub(in crate::swarm) fn among(&self, member: usize, is_heard: &[bool], liars: usize) -> Option<Among> {
         let TargetSource::Rule { engine, particles } = &self.course else { return None };

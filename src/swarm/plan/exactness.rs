@@ -16,6 +16,18 @@ pub struct Exactness {
     pub exact: Vec<&'static str>,
     /// The error of each manoeuvre.
     pub manoeuvres: Vec<ManoeuvreError>,
+    /// Robots without which others do not keep their places, where with all of them every follower does in all of these motions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub needed: Option<Vec<Needed>>,
+}
+
+/// A robot that others cannot do without.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Needed {
+    /// Its name.
+    pub name: String,
+    /// Names of those that fall behind where it is lost.
+    pub by: Vec<String>,
 }
 
 /// How far followers are from their places in a manoeuvre that is flown slowly.
@@ -45,10 +57,28 @@ impl Exactness {
             ("stretch", [[2.0, 1.0], [1.0, 2.0]].map(|stretch| Posture { stretch, ..nominal })),
             ("shear", [[1.0, 0.0], [0.0, 1.0]].map(|shear| Posture { shear, ..nominal })),
         ];
-        let exact = families.into_iter().filter(|(_, postures)| is_exact(postures)).map(|(name, _)| name);
+        let exact: Vec<&str> =
+            families.iter().filter(|(_, postures)| is_exact(postures)).map(|(name, _)| *name).collect();
+        let needed = (exact.len() == families.len()).then(|| needed(formation));
         let manoeuvres = formation.manoeuvres.iter().filter_map(|one| on_the_way(formation, &one.name));
-        Some(Self { exact: exact.collect(), manoeuvres: manoeuvres.collect() })
+        Some(Self { exact, manoeuvres: manoeuvres.collect(), needed })
     }
+}
+
+fn needed(formation: &Formation) -> Vec<Needed> {
+    let mut is_heard = vec![true; formation.count()];
+    let mut without = |lost: usize| {
+        is_heard[lost] = false;
+        let falls = |&m: &usize| m != lost && !formation.leads(m) && !formation.keeps_place(m, &is_heard);
+        let by: Vec<String> = (0..is_heard.len()).filter(falls).map(|m| formation.names[m].clone()).collect();
+        is_heard[lost] = true;
+        by
+    };
+    let names = formation.names.iter().enumerate();
+    names
+        .map(|(m, name)| Needed { name: name.clone(), by: without(m) })
+        .filter(|one| !one.by.is_empty())
+        .collect()
 }
 
 fn on_the_way(formation: &Formation, name: &str) -> Option<ManoeuvreError> {

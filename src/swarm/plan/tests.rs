@@ -265,8 +265,16 @@ fn solved_weights_follow_every_affine_motion_and_equal_ones_shifts_alone() {
     let solved = exactness(&[]);
     assert_eq!(solved.exact, ["shift", "turn", "stretch", "shear"]);
     assert_eq!(solved.manoeuvres, [ManoeuvreError { name: "turn".into(), largest: 0.0 }]);
+    // Along the rim each has its place by the two beside it alone, of five.
+    let needed = solved.needed.as_ref().expect("exact");
+    assert_eq!(needed.len(), 16, "{needed:?}");
+    let by_first = &needed.iter().find(|one| one.name == "robot_1").expect("a corner").by;
+    assert_eq!(by_first, &["robot_2", "robot_6"]);
+    assert!(needed.iter().flat_map(|one| &one.by).all(|name| name != "robot_13"));
+    let words = solved.in_words().join("; ");
+    assert!(words.contains("but robot_10, robot_11, robot_15 and 9 more need one of robot_1, "), "{words}");
     let equal = exactness(&["rule={ rest = \"balanced\" }"]);
-    assert_eq!(equal.exact, ["shift"]);
+    assert_eq!((&equal.exact[..], &equal.needed), (&["shift"][..], &None));
     // By the flight itself, which is slow and swept to rest in every period.
     let slow = [
         "rule={ rest = \"balanced\" }",

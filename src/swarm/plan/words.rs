@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::{Convergence, DelayMargin, Exactness, ManoeuvreError, ManoeuvreSpeed, SpeedMargin, SwarmPlan};
-use crate::scene::text::{counted, decimals};
+use crate::scene::text::{counted, decimals, listed};
 
 /// Smaller values read as zero to three places.
 const NOTHING: f64 = 0.001;
@@ -122,6 +122,20 @@ impl Exactness {
                 decimals(*largest, 3)
             ),
         };
-        std::iter::once(exact).chain(self.manoeuvres.iter().map(of_one)).collect()
+        let without = self.needed.as_deref().map(|needed| match needed {
+            [] => "where any one robot is lost the others go on to do so".to_owned(),
+            needed => {
+                let mut by: Vec<&String> = needed.iter().flat_map(|one| &one.by).collect();
+                by.sort_unstable();
+                by.dedup();
+                let lost: Vec<&String> = needed.iter().map(|one| &one.name).collect();
+                format!(
+                    "where any one robot is lost the others go on to do so, but {} need one of {}",
+                    listed(&by),
+                    listed(&lost)
+                )
+            }
+        });
+        std::iter::once(exact).chain(without).chain(self.manoeuvres.iter().map(of_one)).collect()
     }
 }
