@@ -269,12 +269,16 @@ impl Summary {
             equilibrium: outcome.solved.as_ref().map(Equilibrium::of),
             energies: Energies { pe1, pe2, largest_strain },
             is_short_of_rest: balance.is_some() && !is_tied,
-            cautions: [balance, of_contrast(scene, &outcome.reason)]
-                .into_iter()
-                .flatten()
-                .chain(cautions(scene, outcome, measured.as_ref()))
-                .chain(growing(engine, largest_strain.unwrap_or(0.0)).filter(|_| may_grow))
-                .collect(),
+            cautions: [
+                balance,
+                of_contrast(scene, &outcome.reason),
+                unbalanced(scene, outcome, measured.as_ref()),
+            ]
+            .into_iter()
+            .flatten()
+            .chain(cautions(scene, outcome, measured.as_ref()))
+            .chain(growing(engine, largest_strain.unwrap_or(0.0)).filter(|_| may_grow))
+            .collect(),
             mechanics: measured,
             broken_bonds: broken_bonds(&outcome.engine),
             timings,
@@ -338,6 +342,24 @@ fn off_the_shape(scene: &Scene, engine: &Engine) -> Option<String> {
 /// Whether feedback holds particles by more than their material.
 fn ties_to_reference(scene: &Scene) -> bool {
     scene.feedback.is_some_and(|feedback| feedback.ties_to_reference())
+}
+
+/// Part of reactions and loads that need not balance, and the same in units of the tolerance of the solve \[1\].
+const BALANCED: f64 = 1e-4;
+const TOLERATED: f64 = 100.0;
+
+/// Says that an equilibrium is held by what rounding makes of its stiffness; found by all ranks together.
+fn unbalanced(scene: &Scene, outcome: &Outcome, measured: Option<&Measured>) -> Option<String> {
+    let asked =
+        scene.equilibrium.as_ref().filter(|_| outcome.solved.is_some() && !ties_to_reference(scene))?;
+    let off =
+        measured.filter(|_| scene.rotation() == Rotation::Small)?.mechanics.out_of_balance(&outcome.engine);
+    (off > BALANCED.max(TOLERATED * asked.request.tolerance)).then(|| {
+        format!(
+            "reactions and loads are out of balance by {off:.1e} of their size: rounding of the stiffness holds so slender, or so uneven, a body as supports \
+             do, and its displacements are off by as much; use rotation = \"corotated\", which leaves turns out, or a wider spacing"
+        )
+    })
 }
 
 /// The likely cause of a solve that ended short of its tolerance, where a body is of several materials.

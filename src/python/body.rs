@@ -39,12 +39,14 @@ pub(super) struct Body {
     engine: Engine,
     /// Places of particles led by hand, and in how many more steps they are led there.
     led: BTreeMap<usize, ([f64; 2], u8)>,
+    /// Of the solve that put the body to rest, if it has not moved since.
+    residual: Option<f64>,
 }
 
 impl Body {
     /// The body of a scene as an engine has it.
-    pub(super) fn at(scene: Scene, engine: Engine) -> Self {
-        Self { scene, engine, led: BTreeMap::new() }
+    pub(super) fn at(scene: Scene, engine: Engine, residual: Option<f64>) -> Self {
+        Self { scene, engine, led: BTreeMap::new(), residual }
     }
 
     pub(super) fn count(&self) -> usize {
@@ -134,13 +136,13 @@ impl Body {
     #[pyo3(signature = (scene, *, set=None))]
     fn new(py: Python<'_>, scene: &Bound<'_, PyAny>, set: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let source = Source::scene(scene, set)?;
-        let laid_out = beside(py, None, move |_| {
-            let scene = source.load(&[])?;
+        let laid_out = beside(py, None, move |progress| {
+            let scene = source.chosen(progress)?;
             let plan = plan(&scene)?;
             Ok::<_, SceneError>((scene, Engine::new(plan.setup)))
         });
         let (scene, engine) = laid_out??;
-        Ok(Self::at(scene, engine))
+        Ok(Self::at(scene, engine, None))
     }
 
     /// Steps taken so far; of a body that was put to rest, the step that it rests at.
@@ -161,10 +163,14 @@ impl Body {
         self.engine.body().lattice.spacing()
     }
 
-    /// Largest motion of a particle in the last step, over the spacing [1].
+    /// Largest motion of a particle in the last step, over the spacing [1], 0 before the first; of a body that was put to rest, the
+    /// force that its solver left over that of its load [1].
     #[getter]
     fn residual(&self, py: Python<'_>) -> PyResult<f64> {
-        Ok(here(py, || self.engine.movement())?.largest_move)
+        match self.residual {
+            Some(residual) => Ok(residual),
+            None => Ok(here(py, || self.engine.movement())?.largest_move),
+        }
     }
 
     /// Steps the body, by one step unless `steps` is given.
@@ -175,6 +181,7 @@ impl Body {
     fn advance(&mut self, py: Python<'_>, steps: i64) -> PyResult<()> {
         let end = self.engine.step().saturating_add(positive("steps", steps)?);
         let threads = Threads::taken()?;
+        self.residual = None;
         while self.engine.step() < end {
             if let Some(divergence) = py.detach(|| threads.install(|| self.go(end))) {
                 return Err(diverged(&divergence));
@@ -201,6 +208,7 @@ impl Body {
     fn observe(&mut self, places: &Bound<'_, PyAny>, particles: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let mut seen = placed(particles, places, self.count())?;
         self.engine.observe(seen.iter().copied());
+        self.residual = None;
         // What does not move by itself stays where it was seen.
         seen.retain(|&(i, _)| matches!(self.engine.roles()[i], Role::Clamped | Role::Ghost));
         seen.into_iter().for_each(|(particle, place)| self.lead_to(particle, place));
@@ -215,6 +223,7 @@ impl Body {
         let mut scene = self.scene.clone();
         let outcome = beside(py, None, move |progress| {
             interrupt_by(&mut scene, progress);
+            scene.require_stepless()?;
             let plan = plan(&scene)?;
             if scene.equilibrium.is_some() {
                 let mut see = |_: &Engine, _: f64| std::ops::ControlFlow::Continue(());
@@ -228,6 +237,7 @@ impl Body {
             return Err(diverged(divergence));
         }
         self.engine = engine;
+        self.residual = Some(residual);
         self.led.clear();
         let way = PyDict::new(py);
         way.set_item("reason", reason.name())?;
@@ -240,7 +250,12 @@ impl Body {
 
     /// A body in the same state that goes its own way.
     fn copy(&self) -> Self {
-        Self { scene: self.scene.clone(), engine: self.engine.clone(), led: self.led.clone() }
+        Self {
+            scene: self.scene.clone(),
+            engine: self.engine.clone(),
+            led: self.led.clone(),
+            residual: self.residual,
+        }
     }
 
     /// Present places [length], float64, shape (count, 2); a copy.

@@ -184,7 +184,10 @@ impl Run {
             iterations: outcome.solved.as_ref().map(|solved| solved.iterations),
             steps: moved(py, steps, &shape[..1])?.unbind(),
             positions: moved(py, places, &shape)?.unbind(),
-            body: Py::new(py, Body::at(scene, outcome.engine))?,
+            body: Py::new(
+                py,
+                Body::at(scene, outcome.engine, outcome.solved.as_ref().map(|_| outcome.residual)),
+            )?,
         })
     }
 }

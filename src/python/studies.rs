@@ -150,7 +150,10 @@ impl Comparison {
             cell_places: pairs(py, &cells.centres(&outcome.engine.body().reference))?.unbind(),
             von_mises_rule: moved(py, von_mises_rule, &shape)?.unbind(),
             von_mises_truth: moved(py, von_mises_truth, &shape)?.unbind(),
-            body: Py::new(py, Body::at(scene, outcome.engine))?,
+            body: Py::new(
+                py,
+                Body::at(scene, outcome.engine, outcome.solved.as_ref().map(|_| outcome.residual)),
+            )?,
         })
     }
 }

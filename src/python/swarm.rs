@@ -215,7 +215,8 @@ impl Swarm {
         moved(py, nearest, &shape)
     }
 
-    /// Largest distance of a follower from where it comes to rest [m]; None where the rule is not linear.
+    /// Largest distance of a follower from where it comes to rest [m]; None where the rule is not linear, while a leader is lost, and
+    /// where no follower is known.
     fn formation_error(&self) -> Option<f64> {
         self.control.formation_error()
     }

@@ -119,6 +119,15 @@ impl Scene {
         of_roles.map(named("roles")).chain(of_loads.map(named("loads")))
     }
 
+    /// Refuses a scene that has no equilibrium but the one that it comes to by steps.
+    ///
+    /// # Errors
+    /// Names the key.
+    #[cfg(feature = "python")]
+    pub(crate) fn require_stepless(&self) -> Result<(), SceneError> {
+        validate::equilibrium::check(&self.raw, &|key, message, help| self.refuse(key, message, help))
+    }
+
     /// The first key of a region, if any, that picks particles by their ids.
     pub fn picks_by_ids(&self) -> Option<String> {
         let by_ids = |region: &SceneRegion| matches!(region, SceneRegion::Known(Region::Ids(_)));

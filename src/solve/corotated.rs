@@ -550,7 +550,7 @@ impl Newton<'_> {
             is_rounding = residual <= rounding && self.last_step <= ON_THE_WAY;
             let is_enough = residual <= goal.max(ON_THE_WAY) || is_rounding;
             is_settled |= is_enough;
-            if residual <= goal || (is_enough && stalled >= STALLED) {
+            if residual <= goal || (is_rounding && stalled >= STALLED) {
                 break;
             }
             if residual.is_nan() || residual > 1e6 {

@@ -65,6 +65,33 @@ def test_a_solved_body_balances_its_load(soft_bar):
     assert mechanics["work"]["loads"] / 2 == pytest.approx(mechanics["strain_energy"], rel=1e-9)
 
 
+def test_a_body_that_changes_on_its_way_has_no_equilibrium_without_steps(soft_bar):
+    # The side that is pulled is let go at step 21, and the body goes back.
+    for scene, key in (("tension", r"roles\[\d\].from"), ("fracture", "fracture")):
+        with pytest.raises(flockform.SceneError, match=key):
+            flockform.Body(scene).solve()
+    body = flockform.Body(soft_bar | {"equilibrium": {"solver": "jacobi", "most_iterations": 3}})
+    way = body.solve()
+    assert way["reason"] != "equilibrium" and body.residual == way["residual"] > 0.0
+    body.advance()
+    assert body.residual != way["residual"]
+
+
+def test_a_body_is_laid_out_for_the_accuracy_that_its_scene_asks_for():
+    cantilever = {
+        "lattice": {"kind": "square", "spacing": 2.0},
+        "body": {"shape": {"kind": "rectangle", "max": [20.0, 8.0]}},
+        "material": {"kind": "isotropic", "young": 1000.0, "poisson": 0.3},
+        "rule": {"mean": {"kind": "material"}},
+        "roles": [{"region": {"kind": "edge", "side": "left"}, "role": "clamped"}],
+        "loads": [{"kind": "traction", "region": {"kind": "edge", "side": "right"}, "traction": [0.0, 1.0]}],
+        "equilibrium": {"accuracy": "3%"},
+    }
+    body = flockform.Body(cantilever)
+    body.solve()
+    assert np.array_equal(body.positions(), flockform.run(cantilever).positions[-1])
+
+
 def test_a_load_that_is_taken_off_in_steps_is_solved_to_the_last_of_them(soft_bar):
     body = flockform.Body(soft_bar | {"load_steps": {"schedule": [1.0, 0.3]}})
     body.solve()

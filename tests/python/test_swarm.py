@@ -21,6 +21,7 @@ def test_ideal_robots_end_in_the_formation():
     swarm = flockform.Swarm("square")
     assert swarm.count == len(swarm.names) == 25 and swarm.period == 0.05
     assert swarm.leaders().sum() == 4
+    assert swarm.formation_error() is None, "no robot was seen yet"
     fly(swarm, 1500)
     assert swarm.formation_error() < 1e-9
     assert swarm.clearance().shape == (25,) and swarm.clearance().min() > 0.3

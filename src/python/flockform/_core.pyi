@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
-from typing import Any, Literal, TypeAlias, TypedDict
+from typing import Any, Literal, SupportsIndex, TypeAlias, TypedDict, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -70,6 +70,7 @@ def run(
     the address space is limited (ulimit -v).
     """
 
+@final
 class Run:
     """A scene that was run to its end."""
 
@@ -113,6 +114,7 @@ class Run:
     def body(self) -> Body:
         """The body at the end."""
 
+@final
 class Body:
     """A body that is stepped, led and read.
 
@@ -135,7 +137,9 @@ class Body:
 
     @property
     def residual(self) -> float:
-        """Largest motion of a particle in the last step, over the spacing [1]."""
+        """Largest motion of a particle in the last step, over the spacing [1], 0 before the first; of a body that was put to rest, the
+        force that its solver left over that of its load [1].
+        """
 
     def advance(self, steps: int = 1) -> None:
         """Steps the body, by one step unless `steps` is given.
@@ -246,6 +250,7 @@ def compare(
     may state of themselves [1].
     """
 
+@final
 class Comparison:
     """A rule beside the truth, which is that of finite elements."""
 
@@ -289,6 +294,7 @@ class Comparison:
     def body(self) -> Body:
         """The body at the end of the rule's run."""
 
+@final
 class Swarm:
     """A formation whose poses come from Python and whose targets go there.
 
@@ -359,9 +365,11 @@ class Swarm:
         """Free space around each robot, to its neighbours and to obstacles [m], float64, shape (count,)."""
 
     def formation_error(self) -> float | None:
-        """Largest distance of a follower from where it comes to rest [m]; None where the rule is not linear."""
+        """Largest distance of a follower from where it comes to rest [m]; None where the rule is not linear, while a leader is lost, and
+        where no follower is known.
+        """
 
-    def lead(self, robot: int | str, place: ArrayLike) -> None:
+    def lead(self, robot: SupportsIndex | str, place: ArrayLike) -> None:
         """Gives a leader whose program is external its next place [m], shape (2,).
 
         robot: its name or index.

@@ -86,7 +86,7 @@ fn accuracy(asked: &RawAccuracy, raw: &RawScene, refuse: Refuse<'_>) -> Result<f
 }
 
 /// Stepless runs: nothing may depend on how the body got where it is.
-fn check(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
+pub fn check(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
     let when = raw.roles.iter().position(|entry| entry.when.is_some());
     let later = raw.roles.iter().position(|entry| entry.from > 1);
     let present = matches!(raw.neighbours, Some(RawNeighbours::Dynamic { .. }));
@@ -107,7 +107,7 @@ fn check(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
         Some((key, what)) => Err(refuse(
             &key,
             format!("an equilibrium that is not stepped to has no {what}"),
-            "leave [equilibrium] out to step, or leave this out",
+            "step instead, without [equilibrium], or leave this out",
         )),
     }
 }

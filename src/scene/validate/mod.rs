@@ -2,7 +2,7 @@
 //! checks that concern several keys at once.
 
 pub(super) mod actions;
-mod equilibrium;
+pub(super) mod equilibrium;
 mod load_steps;
 mod material;
 mod points;

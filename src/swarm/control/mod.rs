@@ -633,12 +633,13 @@ impl Control {
         (!any_lost).then(|| self.formation.settled(present)).flatten()
     }
 
-    /// Largest distance of a follower with a usable pose from where it comes to rest \[m\].
+    /// Largest distance of a follower with a usable pose from where it comes to rest \[m\]; `None` also where no follower has one.
     pub fn formation_error(&self) -> Option<f64> {
         let settled = self.settled()?;
-        let follows = |&m: &usize| self.usable[m] && !self.formation.leads(m);
+        let followers = || (0..self.formation.count()).filter(|&m| !self.formation.leads(m));
         let apart = |m: usize| distance(settled.get(m), self.present.get(m));
-        Some((0..self.formation.count()).filter(follows).map(apart).fold(0.0, f64::max))
+        let largest = followers().filter(|&m| self.usable[m]).map(apart).reduce(f64::max);
+        largest.or_else(|| followers().next().is_none().then_some(0.0))
     }
 
     /// Free space around each member \[m\]: see [`Filter::clearance`].
