@@ -86,11 +86,15 @@ fn collapses(from: &Posture, to: &Posture) -> bool {
     };
     // It is a quadratic of the share: of one sign if it is so at both ends and where it turns.
     let [begin, middle, end] = [0.0, 0.5, 1.0].map(between);
+    // What overflows leads out of all range, which is refused as such.
+    if !(begin.is_finite() && end.is_finite()) {
+        return false;
+    }
     let bend = 2.0 * (begin - 2.0 * middle + end);
     let turn = (begin - end + bend) / (2.0 * bend);
     let turn = if (0.0..=1.0).contains(&turn) { between(turn) } else { end };
     // A share of rounding.
-    let least = 1e-12 * (end.abs() + begin.abs());
+    let least = 1e-12 * end.abs().min(begin.abs());
     [turn, end].iter().any(|area| area.abs() <= least || area.signum() != begin.signum())
 }
 
@@ -242,6 +246,7 @@ mod tests {
             ([-1.0, 1.0], [0.0; 2]),
             ([-1.0, -1.0], [0.0; 2]),
             ([-1.0, -2.0], [0.0; 2]),
+            ([-0.3, -0.3], [0.0; 2]),
         ] {
             let refused = ask(stretch, shear).expect_err("collapses");
             assert!(refused.contains("would collapse"), "{stretch:?} {shear:?}: {refused}");
