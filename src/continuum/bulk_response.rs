@@ -144,17 +144,20 @@ fn scalar_crystal(scene: &Scene) -> Result<Crystal, SceneError> {
 }
 
 /// Power of the distance at and below which its weights let a chain run together: its shortest wave changes by `-1 - 2 p` at each step.
-const FALLS_TOO_FAST: f64 = -1.0;
+pub(super) const FALLS_TOO_FAST: f64 = -1.0;
 
 /// The rule for small displacements about rest, and what its update divides by on each sublattice.
 fn about_rest(scene: &Scene) -> Result<(Crystal, Vec<Block>), SceneError> {
     let scalar = scalar_crystal(scene)?;
-    let (weighted, crystal) = match scene.mean {
-        Mean::Distance { power } => (linearised(&scalar, power, 0.0), linearised(&scalar, power, power)),
-        _ => (scalar.clone(), scalar),
-    };
-    let divisors = (0..weighted.bonds.len()).map(|s| weighted.diagonal(s)).collect();
-    Ok((crystal, divisors))
+    Ok(match scene.mean {
+        Mean::Distance { power } => {
+            (linearised(&scalar, power, power), linearised(&scalar, power, 0.0).diagonals())
+        }
+        _ => {
+            let divisors = scalar.diagonals();
+            (scalar, divisors)
+        }
+    })
 }
 
 /// Weights `d^p` of the present distance `d`, for small displacements about rest: their derivative adds

@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use super::bulk_response::FALLS_TOO_FAST;
 use super::plan::Plan;
 use crate::engine::Engine;
 use crate::engine::movement::Movement;
@@ -315,7 +316,7 @@ fn cause_in_sweep(engine: &Engine) -> Option<String> {
             )
         });
     }
-    if matches!(rule.mean, Mean::Distance { power } if power < -1.0) {
+    if matches!(rule.mean, Mean::Distance { power } if power < FALLS_TOO_FAST) {
         return Some("weights that fall with the distance draw each particle to its nearest neighbour; use a rule.mean.power above -1".into());
     }
     if matches!(rule.mean, Mean::Distance { power } if power > 0.0) && is_synchronous {

@@ -277,7 +277,7 @@ impl Summary {
             .into_iter()
             .flatten()
             .chain(cautions(scene, outcome, measured.as_ref()))
-            .chain(growing(engine, largest_strain.unwrap_or(0.0)).filter(|_| may_grow))
+            .chain(may_grow.then(|| growing(engine, largest_strain.unwrap_or(0.0))).flatten())
             .collect(),
             mechanics: measured,
             broken_bonds: broken_bonds(&outcome.engine),
@@ -310,7 +310,7 @@ fn cautions(scene: &Scene, outcome: &Outcome, measured: Option<&Measured>) -> Ve
     };
     uneven_sides(scene)
         .into_iter()
-        .chain(bulk_response::cautions(scene).into_iter().filter(|_| !is_at_rest))
+        .chain((!is_at_rest).then(|| bulk_response::cautions(scene)).into_iter().flatten())
         .chain(late::cautions(scene))
         .chain(doubts::seen(scene, engine))
         .chain(cuts::made(scene, engine))

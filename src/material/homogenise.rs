@@ -222,6 +222,11 @@ impl Crystal {
         sum
     }
 
+    /// The same of all sublattices.
+    pub fn diagonals(&self) -> Vec<Block> {
+        (0..self.bonds.len()).map(|s| self.diagonal(s)).collect()
+    }
+
     /// The continuum of long waves; refuses a rule that is not symmetric.
     pub fn effective(&self) -> Result<Effective, HomogeniseError> {
         self.require_symmetric()?;

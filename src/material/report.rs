@@ -194,10 +194,7 @@ pub struct Waves {
 impl MaterialReport {
     /// The material that a rule without forces is; `rule` is its name.
     pub fn of_rule(lattice: &Lattice, rule: String, crystal: &Crystal) -> Result<Self, HomogeniseError> {
-        let zone = crystal.zone()?;
-        let effective = crystal.effective()?;
-        let material = Material::up_to_scale(&effective);
-        Ok(Self::gather(lattice, rule, crystal, &effective, material, &zone))
+        Self::of_rule_over(lattice, rule, crystal, &crystal.diagonals())
     }
 
     /// The weights that a material takes on a lattice, and what material those weights are.
@@ -231,7 +228,7 @@ impl MaterialReport {
             rule,
             asked: None,
             weights: (0..crystal.bonds.len()).flat_map(of_sublattice).collect(),
-            diagonal: (0..crystal.bonds.len()).map(|s| crystal.diagonal(s)).collect(),
+            diagonal: crystal.diagonals(),
             material,
             gradient: Gradient::of(effective),
             waves: Waves::of(zone),
@@ -246,8 +243,10 @@ impl MaterialReport {
         crystal: &Crystal,
         divisors: &[Block],
     ) -> Result<Self, HomogeniseError> {
-        let waves = Waves::of(&crystal.zone_over(divisors)?);
-        Ok(Self { waves, ..Self::of_rule(lattice, rule, crystal)? })
+        let zone = crystal.zone_over(divisors)?;
+        let effective = crystal.effective()?;
+        let material = Material::up_to_scale(&effective);
+        Ok(Self::gather(lattice, rule, crystal, &effective, material, &zone))
     }
 
     /// Whether every weight is a number times the identity.

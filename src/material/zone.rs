@@ -42,8 +42,7 @@ impl Crystal {
     /// Samples the Brillouin zone and refines the extremes found; refuses a rule that is not symmetric,
     /// and one whose `D` is not positive definite.
     pub fn zone(&self) -> Result<Zone, HomogeniseError> {
-        let own: Vec<_> = (0..self.bonds.len()).map(|s| self.diagonal(s)).collect();
-        self.zone_over(&own)
+        self.zone_over(&self.diagonals())
     }
 
     /// As [`Crystal::zone`], of an update that divides by these blocks instead of `D`; shape \[sublattices\].

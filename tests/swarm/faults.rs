@@ -288,7 +288,7 @@ fn a_dead_robot_sends_no_other_away_where_weights_are_below_zero() {
     }
 }
 
-/// The formation turns by 90 degrees while a robot lies behind: whoever stood beside it has its place by those that are left.
+/// The formation turns by 90 degrees while a robot lies behind: those that stood beside it have their places by the ones that are left.
 #[test]
 fn neighbours_that_are_left_keep_the_places_of_an_affine_formation() {
     for dead in [6, 12, 13] {

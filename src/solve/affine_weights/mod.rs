@@ -110,12 +110,13 @@ const REPRODUCED: f64 = 1e-9;
 pub fn solve(reference: &Vectors, neighbours: &Neighbours, follows: &[bool]) -> Result<Solved, WeightsError> {
     let mut solved = Solved::default();
     for (member, &follows) in follows.iter().enumerate() {
-        let count = neighbours.of(member).len();
+        let near = neighbours.of(member);
+        let count = near.len();
         if !follows {
             solved.weights.extend(std::iter::repeat_n(1.0 / count as f64, count));
             continue;
         }
-        let weights = weights_of(member, reference, neighbours)?;
+        let weights = weights_of(member, reference, near)?;
         let factor = weights.iter().map(|w| w.abs()).sum::<f64>();
         if factor > MOST_AMPLIFICATION {
             return Err(WeightsError::Amplifies { member, factor, most: MOST_AMPLIFICATION });
@@ -149,17 +150,16 @@ pub fn of_those_left(flock: &Flock, particle: usize, is_left: impl Fn(usize) -> 
         return None;
     }
     let slots: Vec<usize> = (0..near.len()).filter(|&slot| is_left(near[slot] as usize)).collect();
-    let left: Vec<[f64; 2]> = slots.iter().map(|&slot| offsets[slot]).collect();
-    let largest = own.iter().fold(spread, |most, x| most.max(x.abs()));
-    let found = (!left.is_empty()).then(|| nearest(&left, largest).ok()).flatten()?;
+    let left: Vec<u32> = slots.iter().map(|&slot| near[slot]).collect();
+    let found = weights_of(particle, &flock.reference, &left).ok()?;
     let mut all = vec![0.0; near.len()];
     slots.iter().zip(&found).for_each(|(&slot, &weight)| all[slot] = weight);
     found.iter().all(|&weight| weight >= 0.0).then_some(all)
 }
 
-fn weights_of(member: usize, reference: &Vectors, neighbours: &Neighbours) -> Result<Vec<f64>, WeightsError> {
+fn weights_of(member: usize, reference: &Vectors, near: &[u32]) -> Result<Vec<f64>, WeightsError> {
     let own = reference.get(member);
-    let places: Vec<[f64; 2]> = neighbours.of(member).iter().map(|&k| reference.get(k as usize)).collect();
+    let places: Vec<[f64; 2]> = near.iter().map(|&k| reference.get(k as usize)).collect();
     if places.is_empty() {
         return Err(WeightsError::NoNeighbours { member });
     }

@@ -53,7 +53,7 @@ fn those_left_around_a_particle_have_its_place_and_those_beside_it_alone_have_no
     let around = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [1.0, 1.0]];
     let places: Vectors = [[0.0; 2]].into_iter().chain(around).collect();
     let neighbours = Neighbours::from_lists([vec![1, 2, 3, 4, 5], vec![], vec![], vec![], vec![], vec![]]);
-    let mut solved = weights_of(0, &places, &neighbours).expect("solved");
+    let mut solved = weights_of(0, &places, neighbours.of(0)).expect("solved");
     let flock = |weights: &[f64]| {
         let weights = Weights::Scalar(weights.to_vec());
         Flock::new(Rule::BARYCENTRE, places.clone().into(), neighbours.clone(), weights)

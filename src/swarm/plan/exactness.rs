@@ -67,18 +67,19 @@ impl Exactness {
 
 fn needed(formation: &Formation) -> Vec<Needed> {
     let mut is_heard = vec![true; formation.count()];
-    let mut without = |lost: usize| {
-        is_heard[lost] = false;
-        let falls = |&m: &usize| m != lost && !formation.leads(m) && !formation.keeps_place(m, &is_heard);
-        let by: Vec<String> = (0..is_heard.len()).filter(falls).map(|m| formation.names[m].clone()).collect();
-        is_heard[lost] = true;
-        by
-    };
-    let names = formation.names.iter().enumerate();
-    names
-        .map(|(m, name)| Needed { name: name.clone(), by: without(m) })
-        .filter(|one| !one.by.is_empty())
-        .collect()
+    let mut all: Vec<Needed> =
+        formation.names.iter().map(|name| Needed { name: name.clone(), by: Vec::new() }).collect();
+    for m in (0..formation.count()).filter(|&m| !formation.leads(m)) {
+        for lost in formation.depends_on(m) {
+            is_heard[lost] = false;
+            if !formation.keeps_place(m, &is_heard) {
+                all[lost].by.push(formation.names[m].clone());
+            }
+            is_heard[lost] = true;
+        }
+    }
+    all.retain(|one| !one.by.is_empty());
+    all
 }
 
 fn on_the_way(formation: &Formation, name: &str) -> Option<ManoeuvreError> {
