@@ -19,8 +19,9 @@ use crate::flock::vectors::{Vectors, distance};
 use crate::ranks::Team;
 use crate::scene::{LoadSteps, Scene, SceneError};
 use crate::solve::corotated::{self, CorotatedError, Way};
-use crate::solve::equilibrium::{Choice, Request, SolveError, Solved, Solver, System, choose, solve_shared};
+use crate::solve::equilibrium::{Choice, Request, SolveError, Solved, Solver, System, choose};
 use crate::solve::linear::{HeldComponent, NotLinear, overshoot, system};
+use crate::solve::refined::solve_refined;
 use crate::solve::shared::SystemPart;
 
 /// Runs a plan to its end as its scene asks: stepping, or straight to the equilibrium under the whole load. `see` sees each step of
@@ -117,11 +118,21 @@ fn solve_plan(
 ) -> Result<Solved, SceneError> {
     if !corotated::is_corotated(&plan.setup.flock) {
         let system = shared_system(scene, plan, team, plan.stop.steps as f64)?;
-        return solve_shared(&system, request, team).map_err(|error| refuse(scene, &error));
+        return solve_linear(plan, system, request, team).map_err(|error| refuse(scene, &error));
     }
     let steps = steps_of_the_way(plan) as f64;
     let held = |part: f64| way_after(plan, part * steps);
     solve_corotated(plan, &Way::whole(&held), request, team).map_err(|error| refuse_corotated(scene, &error))
+}
+
+fn solve_linear(
+    plan: &Plan,
+    system: System,
+    request: &Request,
+    team: Option<&Team>,
+) -> Result<Solved, SolveError> {
+    let (flock, body) = (&plan.setup.flock, &plan.setup.body);
+    solve_refined((flock, body), (&follows(plan), &held_axes(plan)), system, request, team)
 }
 
 /// Every rank solves the whole body, or each has a part of it, and all end alike.

@@ -10,6 +10,8 @@ pub mod linear;
 pub mod operator;
 pub(crate) mod order;
 pub(crate) mod part;
+pub(crate) mod refined;
 pub(crate) mod shared;
 pub mod spectrum;
 pub(crate) mod stopwatch;
+mod whole;

@@ -3,14 +3,14 @@
 use super::{Observer, Outcome, Plan, StopReason, overflow, steps_of_the_way};
 use super::{
     engine_of, farthest_from_target, reason, refuse, refuse_corotated, shared_system, solve_corotated,
-    way_after,
+    solve_linear, way_after,
 };
 use crate::engine::load::scaled;
 use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
 use crate::scene::{Scene, SceneError};
 use crate::solve::corotated::{self, CorotatedError, Way};
-use crate::solve::equilibrium::{Request, SolveError, Solved, solve_shared};
+use crate::solve::equilibrium::{Request, SolveError, Solved};
 
 /// Why a part of the way cannot be gone.
 enum Failure {
@@ -86,7 +86,7 @@ fn settle_at(
     if !corotated::is_corotated(&plan.setup.flock) {
         plan.setup.flock.forces = whole.map(|whole| scaled(whole, part));
         let system = shared_system(scene, plan, team, part * steps).map_err(Failure::Refused)?;
-        return solve_shared(&system, request, team).map_err(|error| match error {
+        return solve_linear(plan, system, request, team).map_err(|error| match error {
             SolveError::Interrupted => Failure::Interrupted,
             error => Failure::Refused(refuse(scene, &error)),
         });

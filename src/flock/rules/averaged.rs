@@ -29,6 +29,8 @@ pub struct PatchCell<'a> {
 pub struct PatchRow {
     /// \[force, world frame\]
     pub force: [f64; 2],
+    /// The energy that the patch stores \[force length\].
+    pub energy: f64,
     /// Second derivatives of the energy to the particle and to its neighbours, or itself \[force / length\].
     pub tangent: Vec<(u32, Block)>,
 }
@@ -92,7 +94,8 @@ pub fn row<'a>(
             }
         }
     }
-    Some(PatchRow { force: own.map(|v| -k * dilatation * v), tangent })
+    let energy = 0.5 * k * dilatation * dilatation;
+    Some(PatchRow { force: own.map(|v| -k * dilatation * v), energy, tangent })
 }
 
 #[cfg(test)]

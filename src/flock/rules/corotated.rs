@@ -120,6 +120,8 @@ pub struct CellRow {
     pub turn: Turn,
     /// Force of the cell on the corner \[force, world frame\].
     pub force: [f64; 2],
+    /// The energy that the cell stores \[force length\].
+    pub energy: f64,
     /// Second derivatives of the energy to the corner and each corner \[force / length\], shape \[corners\].
     pub tangent: Vec<Block>,
 }
@@ -214,7 +216,8 @@ impl Element {
             turn.turned(&[[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]])
         });
         let force = turn.forth(self.balanced(own, l[own], moment));
-        Some(CellRow { turn, force, tangent: tangent.collect() })
+        let energy = 0.5 * sum(&|k| dot(turn.strained(corner(k)), l[k]));
+        Some(CellRow { turn, force, energy, tangent: tangent.collect() })
     }
 }
 

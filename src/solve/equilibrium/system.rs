@@ -123,6 +123,20 @@ impl System {
         of_body
     }
 
+    /// Where particles are while the followers have not moved yet, in the order of the body.
+    pub(crate) fn before(&self) -> Vectors {
+        self.in_body(self.with_held(Vectors::zeros(self.operator.count())))
+    }
+
+    /// The same under other forces, in the order of the body \[force\], with held particles that stay.
+    pub(crate) fn under(self, forces: &Vectors) -> Self {
+        let by_place =
+            |numbers: &Vec<u32>| numbers.iter().map(|&number| forces.get(number as usize)).collect();
+        let numbers = self.numbers.as_ref().filter(|_| self.part.is_none());
+        let forces = numbers.map_or_else(|| forces.clone(), by_place);
+        Self { held: Vectors::zeros(forces.len()), forces, ..self }
+    }
+
     /// The followers' displacements with those of the held particles.
     pub(super) fn with_held(&self, found: Vectors<f64>) -> Vectors {
         let mut displacement = Vectors { x: found.x, y: found.y };

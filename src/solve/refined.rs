@@ -1,0 +1,86 @@
+//! Equilibria of slender bodies, whose rows have rounded away what bends them.
+//!
+//! The diagonal of a row is what its neighbours pull with, summed up and rounded: moved as a whole, a body of stiffness `K` feels
+//! `eps |K| |u|`. A beam a thousand times as long as high bends by so much under so little load that this is some percent of
+//! it, and no solver of the rounded system sees it. Forces from the *differences* of displacements do not have it, and what
+//! they leave is solved for again (iterative refinement; N. J. Higham, *Accuracy and Stability of Numerical Algorithms*, 2002,
+//! chapter 12).
+
+use rayon::prelude::*;
+
+use super::equilibrium::{Request, SolveError, Solved, System, solve_shared};
+use super::whole::Whole;
+use crate::flock::body::Body;
+use crate::flock::law::{Flock, Weights};
+use crate::flock::rules::Rule;
+use crate::flock::vectors::Vectors;
+use crate::geometry::point::plus;
+use crate::ranks::Team;
+
+/// Solves after the first one, at most.
+const MOST: usize = 3;
+/// Part of a residual that another solve may leave to be worth its while.
+const WORTH_IT: f64 = 0.5;
+
+/// The equilibrium of a system that is that of a body, whose rule is `flock` and whose particles follow, or are held along some
+/// axes (shape \[count\]\[x, y\], or empty); shared with a team, each rank with a part of the body or all with the whole of it.
+///
+/// # Errors
+/// As [`solve_shared`].
+pub fn solve_refined(
+    (flock, body): (&Flock, &Body),
+    (follows, held_axes): (&[bool], &[[bool; 2]]),
+    mut system: System,
+    request: &Request,
+    team: Option<&Team>,
+) -> Result<Solved, SolveError> {
+    let mut solved = solve_shared(&system, request, team)?;
+    let is_material = flock.rule == Rule::MATERIAL && matches!(flock.weights, Weights::Matrix(_));
+    if solved.known_to.is_none() || !is_material {
+        return Ok(solved);
+    }
+    let whole = Whole::new(body, team.filter(|_| body.part.is_some()));
+    let left = |u: &Vectors| -> Vectors {
+        let force = |i: usize| {
+            if !(follows[i] && body.exact().contains(&i)) {
+                return [0.0; 2];
+            }
+            let load = flock.forces.as_ref().map_or([0.0; 2], |forces| forces.get(i));
+            let force = plus(flock.force_under(i, u), load);
+            let held = held_axes.get(i).copied().unwrap_or_default();
+            [0, 1].map(|axis| if held[axis] { 0.0 } else { force[axis] })
+        };
+        let force: Vec<[f64; 2]> = (0..u.len()).into_par_iter().map(force).collect();
+        force.into_iter().collect()
+    };
+    let size = whole.norm(&left(&system.before()));
+    let mut force = left(&solved.displacement);
+    let mut residual = whole.norm(&force) / size;
+    for _ in 0..MOST {
+        if residual <= request.tolerance || residual.is_nan() {
+            break;
+        }
+        system = system.under(&force);
+        let more = match solve_shared(&system, request, team) {
+            Ok(more) => more.displacement,
+            Err(SolveError::Interrupted) => return Err(SolveError::Interrupted),
+            Err(_) => break,
+        };
+        let refined: Vectors =
+            solved.displacement.iter().zip(more.iter()).map(|(u, by)| plus(u, by)).collect();
+        force = left(&refined);
+        let now = whole.norm(&force) / size;
+        tracing::debug!(residual, now, "refined by forces from differences of displacements");
+        // What was found is the error of what was there, and what is left is to what was left as the error now is to that.
+        let (error, part) = (whole.norm(&more) / whole.norm(&refined), now / residual);
+        solved.known_to = Some(error * part.min(1.0)).filter(|error| error.is_finite());
+        if part < 1.0 {
+            solved.displacement = refined;
+        }
+        if part.is_nan() || part > WORTH_IT {
+            break;
+        }
+        residual = now;
+    }
+    Ok(solved)
+}
