@@ -8,7 +8,7 @@
 
 use rayon::prelude::*;
 
-use super::equilibrium::{Request, SolveError, Solved, System, solve_shared};
+use super::equilibrium::{Choice, Request, SolveError, Solved, System, solve_shared};
 use super::whole::Whole;
 use crate::flock::body::Body;
 use crate::flock::law::{Flock, Weights};
@@ -18,8 +18,10 @@ use crate::geometry::point::plus;
 use crate::ranks::Team;
 
 /// Solves after the first one, at most.
-const MOST: usize = 3;
-/// Part of a residual that another solve may leave to be worth its while.
+const MOST: usize = 8;
+/// Tolerance of each of them: the system is rounded itself.
+const OF_WHAT_IS_LEFT: f64 = 1e-3;
+/// Part of a correction that the next one may be, lest the system have too few digits to find it.
 const WORTH_IT: f64 = 0.5;
 
 /// The equilibrium of a system that is that of a body, whose rule is `flock` and whose particles follow, or are held along some
@@ -53,34 +55,35 @@ pub fn solve_refined(
         let force: Vec<[f64; 2]> = (0..u.len()).into_par_iter().map(force).collect();
         force.into_iter().collect()
     };
-    let size = whole.norm(&left(&system.before()));
-    let mut force = left(&solved.displacement);
-    let mut residual = whole.norm(&force) / size;
+    let again = Request {
+        tolerance: OF_WHAT_IS_LEFT.max(request.tolerance),
+        solver: Choice::This(solved.solver),
+        ..*request
+    };
+    let mut last = f64::INFINITY;
     for _ in 0..MOST {
-        if residual <= request.tolerance || residual.is_nan() {
-            break;
-        }
-        system = system.under(&force);
-        let more = match solve_shared(&system, request, team) {
-            Ok(more) => more.displacement,
+        system = system.under(&left(&solved.displacement));
+        let more = match solve_shared(&system, &again, team) {
             Err(SolveError::Interrupted) => return Err(SolveError::Interrupted),
             Err(_) => break,
+            Ok(more) => more,
         };
-        let refined: Vectors =
-            solved.displacement.iter().zip(more.iter()).map(|(u, by)| plus(u, by)).collect();
-        force = left(&refined);
-        let now = whole.norm(&force) / size;
-        tracing::debug!(residual, now, "refined by forces from differences of displacements");
-        // What was found is the error of what was there, and what is left is to what was left as the error now is to that.
-        let (error, part) = (whole.norm(&more) / whole.norm(&refined), now / residual);
-        solved.known_to = Some(error * part.min(1.0)).filter(|error| error.is_finite());
-        if part < 1.0 {
-            solved.displacement = refined;
-        }
-        if part.is_nan() || part > WORTH_IT {
+        let refined = solved.displacement.iter().zip(more.displacement.iter()).map(|(u, by)| plus(u, by));
+        let refined: Vectors = refined.collect();
+        let correction = whole.norm(&more.displacement) / whole.norm(&refined);
+        tracing::debug!(correction, "refined by forces from differences of displacements");
+        if correction.is_nan() || correction > WORTH_IT * last {
+            solved.known_to = Some(correction).filter(|part| part.is_finite());
             break;
         }
-        residual = now;
+        solved.displacement = refined;
+        // Each is the error of what was there before it, and the next one would be as much less again.
+        solved.known_to = Some(correction * if last.is_finite() { correction / last } else { 1.0 });
+        (0..2).for_each(|phase| solved.phases[phase].1 += more.phases[phase].1);
+        if correction <= request.tolerance {
+            break;
+        }
+        last = correction;
     }
     Ok(solved)
 }

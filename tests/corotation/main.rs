@@ -3,6 +3,7 @@
 mod back;
 mod balance;
 mod elastica;
+mod snapping;
 mod support;
 #[path = "../common/tractions.rs"]
 mod tractions;

@@ -11,5 +11,6 @@ mod reports;
 #[path = "../common/scenes.rs"]
 mod scenes;
 mod scenes_at_rest;
+mod slender;
 #[cfg(feature = "bench")]
 mod support;

@@ -123,11 +123,6 @@ impl System {
         of_body
     }
 
-    /// Where particles are while the followers have not moved yet, in the order of the body.
-    pub(crate) fn before(&self) -> Vectors {
-        self.in_body(self.with_held(Vectors::zeros(self.operator.count())))
-    }
-
     /// The same under other forces, in the order of the body \[force\], with held particles that stay.
     pub(crate) fn under(self, forces: &Vectors) -> Self {
         let by_place =

@@ -1,0 +1,64 @@
+//! Beams so slender that rounded rows hold them: against closed forms.
+
+use std::ops::ControlFlow;
+
+use flockform::continuum::equilibrium::run_to_equilibrium;
+use flockform::scene::Scene;
+
+use crate::scenes::planned;
+
+const YOUNG: f64 = 1000.0;
+
+/// The deflection that ends a beam of height 1 with so many square cells over it, of a material without Poisson's ratio. Such a
+/// cell with straight sides is `1 + 1 / 2` times as stiff in bending as what it stands for (R. D. Cook et al., *Concepts and
+/// Applications of Finite Element Analysis*, parasitic shear); the share of `n` of them over the height is `1 + 1 / (2 n n)`.
+fn deflection([shear, moment]: [f64; 2], length: f64, cells: f64) -> f64 {
+    let stiffness = YOUNG / 12.0 * (1.0 + 0.5 / (cells * cells));
+    let of_shear = 2.0 * shear * length / YOUNG;
+    length * length * (shear * length / 3.0 + moment / 2.0) / stiffness + of_shear
+}
+
+fn found(length: f64, cells: f64, solver: &str, load: &str) -> f64 {
+    let text = format!(
+        "title = \"strip\"\n\
+         lattice = {{ kind = \"square\", spacing = {} }}\n\
+         body = {{ shape = {{ kind = \"rectangle\", max = [{length:?}, 1.0] }} }}\n\
+         material = {{ kind = \"isotropic\", young = {YOUNG:?}, poisson = 0.0 }}\n\
+         rule = {{ mean = {{ kind = \"material\" }} }}\n\
+         roles = [{{ region = {{ kind = \"edge\", side = \"left\" }}, role = \"clamped\" }}]\n\
+         loads = [{{ kind = \"traction\", region = {{ kind = \"edge\", side = \"right\" }}, {load} }}]\n\
+         equilibrium = {{ solver = \"{solver}\" }}\n",
+        1.0 / cells
+    );
+    let scene =
+        Scene::parse("strip", "strip.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+    let outcome = run_to_equilibrium(&scene, planned(&scene), &mut |_, _| ControlFlow::Continue(()))
+        .unwrap_or_else(|error| panic!("{error}"));
+    let solved = outcome.solved.expect("solved");
+    assert!(solved.is_at_rest(), "{length} {cells} {solver}: {:?}", solved.known_to);
+    let ends = outcome.engine.body().reference.iter().zip(solved.displacement.iter());
+    let ends: Vec<f64> = ends.filter(|(place, _)| place[0] > length - 1e-6).map(|(_, u)| u[1]).collect();
+    ends.iter().sum::<f64>() / ends.len() as f64
+}
+
+#[test]
+fn a_beam_thousands_of_times_as_long_as_high_bends_as_its_closed_form() {
+    for (length, cells, solver) in
+        [(1000.0, 2.0, "multigrid"), (2000.0, 2.0, "direct"), (4000.0, 1.0, "direct")]
+    {
+        // About as far as the beam is high.
+        let shear = 250.0 / (length * length * length);
+        let across = format!("traction = [0.0, {shear:e}]");
+        let moment = 1e3 / 6.0 / (length * length);
+        let turning = format!(
+            "traction = [{:e}, 0.0], profile = {{ from = [{length:?}, 0.0], to = [{length:?}, 1.0], factors = [1.0, -1.0] }}",
+            6.0 * moment
+        );
+        for (load, [shear, moment]) in [(across, [shear, 0.0]), (turning, [0.0, moment])] {
+            let (exact, found) =
+                (deflection([shear, moment], length, cells), found(length, cells, solver, &load));
+            let off = found / exact - 1.0;
+            assert!(off.abs() < 1e-6, "{length} {cells} {solver} {load}: {off:e}");
+        }
+    }
+}
