@@ -3,6 +3,7 @@
 #![cfg(feature = "cli")]
 
 mod beginnings;
+mod cautions;
 mod checkpoint;
 #[path = "../common/cloud.rs"]
 mod cloud;
@@ -29,6 +30,7 @@ mod process;
 mod program;
 #[cfg(not(feature = "mpi"))]
 mod ranks;
+mod refusals;
 mod report;
 mod run;
 #[path = "../common/signals.rs"]
