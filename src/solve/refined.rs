@@ -73,7 +73,7 @@ pub fn solve_refined(
         let correction = whole.norm(&more.displacement) / whole.norm(&refined);
         tracing::debug!(correction, "refined by forces from differences of displacements");
         if correction.is_nan() || correction > WORTH_IT * last {
-            solved.known_to = Some(correction).filter(|part| part.is_finite());
+            solved.known_to = Some(correction + last).filter(|part| part.is_finite());
             break;
         }
         solved.displacement = refined;
