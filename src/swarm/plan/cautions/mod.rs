@@ -217,15 +217,23 @@ fn commanded_astray<'a>(raw: &'a RawSwarm, flight: &'a Flight) -> impl Iterator<
 }
 
 fn fast_manoeuvres(raw: &RawSwarm, formation: &Formation) -> impl Iterator<Item = String> {
-    let limit = raw.limits.speed.unwrap_or(f64::INFINITY);
+    let [fastest, most] =
+        [raw.limits.speed, raw.limits.acceleration].map(|limit| limit.unwrap_or(f64::INFINITY));
     let all = raw.manoeuvres.iter().filter_map(|one| needed(formation, &one.name));
-    let fast = all.filter(move |one| !at_most(one.needed, limit));
-    fast.map(|ManoeuvreSpeed { name, needed }| {
-        format!(
-            "manoeuvre `{name}` moves a robot's place at up to {} m/s, above limits.speed: robots will fall \
-             behind; give its legs more seconds",
-            decimals(needed, 3)
-        )
+    all.flat_map(move |ManoeuvreSpeed { name, needed, acceleration }| {
+        let asked = [
+            (needed, fastest, "moves a robot's place at up to", "m/s, above limits.speed"),
+            (acceleration, most, "changes a place's velocity by up to", "m/s^2, above limits.acceleration"),
+        ];
+        let above = asked.into_iter().filter(|(value, limit, ..)| !at_most(*value, *limit));
+        let words = above.map(|(value, _, asks, limit)| format!("{asks} {} {limit}", decimals(value, 3)));
+        let words: Vec<String> = words.collect();
+        (!words.is_empty()).then(|| {
+            format!(
+                "manoeuvre `{name}` {}: robots will fall behind; give its legs more seconds",
+                words.join(", and ")
+            )
+        })
     })
 }
 
