@@ -237,6 +237,11 @@ impl Formation {
         self.is_moved = self.leads.iter().map(|lead| matches!(lead, Some(Lead::External(_)))).collect();
     }
 
+    /// How a program of the swarm leads a member.
+    pub(in crate::swarm) fn lead(&self, member: usize) -> Option<&Lead> {
+        self.leads[member].as_ref()
+    }
+
     /// Whether a program of the swarm leads a member.
     pub fn is_led(&self, member: usize) -> bool {
         self.leads[member].is_some()

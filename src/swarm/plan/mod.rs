@@ -6,8 +6,12 @@
 //! * the formation forgets a disturbance by the spectral radius of `A` in a period; a delay of `d` periods makes that
 //!   its `d + 1`st root, which is below 1 as well: delay slows the formation and never makes it grow;
 //! * noise of the poses moves a follower by the root of the diagonal of `C = A C A' + A A' + B B'` times that noise;
-//! * behind leaders that move steadily a follower lags by the row of `(1 - A)^-1 (A + B) 1` times their way in a period,
-//!   `d + 1` times that under a delay of `d` periods.
+//! * behind leaders that move steadily a follower lags by the row `n` of `(1 - A)^-1 (A + B) 1` times their way in a period,
+//!   `d + 1` times that under a delay of `d` periods;
+//! * where each robot is kept a way `b` behind its target, in which it could brake, it is `n b` farther behind the leaders,
+//!   and `(n + 1) b` behind their program, behind which they are themselves.
+//!
+//! For many followers, or with a frame, which remembers, the lag is that of the loop itself, run until it is steady.
 //!
 //! A loop that is not linear has no such map, and nothing of this is stated of it.
 
@@ -21,21 +25,27 @@ mod words;
 use serde::Serialize;
 
 use super::formation::Formation;
-use crate::flock::rounding::ROUNDING;
+use crate::flock::manoeuvre::Demand;
+use crate::flock::rounding::{ROUNDING, at_most};
 use crate::flock::vectors::distance;
 use crate::scene::SceneError;
 use crate::scene::swarm::{Shape, Swarm};
+use crate::scene::text::decimals;
 use crate::solve::spectrum::LinearSweep;
 use crate::swarm::flight::Flight;
+use crate::swarm::robots::DoubleIntegrator;
 use crate::swarm::safety::Limits;
 pub use exactness::{Exactness, ManoeuvreError};
-use period_map::PeriodMap;
+use period_map::{PeriodMap, lag_when_led};
 
 /// Sweeps made to find the spectral radius.
 const MOST_SWEEPS: usize = 5000;
 
 /// A lag below this sets no speed: what it allows is far above that of any robot \[s\].
 const LEAST_LAG: f64 = 1e-3;
+
+/// The reason for which no lag is known of followers that are never in their places.
+const NEVER_STEADY: &str = "disturbances do not die out";
 
 /// Standard deviations of noise that each robot keeps farther away from everything.
 const DEVIATIONS_KEPT: f64 = 3.0;
@@ -125,12 +135,18 @@ pub struct SpeedMargin {
     /// The time by which the last follower is behind steadily and slowly moving leaders under the simulated delay, in the
     /// formation \[s\].
     pub lag_s: Option<f64>,
+    /// The reason for which that is not known.
+    pub lag_not_known: Option<&'static str>,
     /// How much more that is for each of the leaders' metres a second, by the acceleration limit \[s^2/m\]: a robot at a speed of `v` is
     /// held as far behind its target as it goes while it brakes, `v^2 / (2 a)`.
     pub lag_per_speed: Option<f64>,
-    /// Speed of the leaders up to which followers keep within `flight.bounds.affine_error` of their places \[m/s\], at most
-    /// the speed limit; absent without such a bound or a limit, and where followers lag by nothing that could be
-    /// measured.
+    /// How much more it is at least for robots that brake in whole periods, however slow the leaders are \[s\].
+    pub least_braking_lag_s: Option<f64>,
+    /// `flight.bounds.affine_error` \[m\].
+    pub bound: Option<f64>,
+    /// Speed of a steady program up to which leaders and followers keep within that bound of their places by it \[m/s\], at most the
+    /// speed limit, and that alone without a bound; absent where neither is given or reached, and where there is a bound and
+    /// the lag is not known.
     pub reachable: Option<f64>,
     /// The demands of each manoeuvre.
     pub manoeuvres: Vec<ManoeuvreSpeed>,
@@ -143,6 +159,8 @@ pub struct ManoeuvreSpeed {
     pub name: String,
     /// Largest speed of a place of the formation \[m/s\].
     pub needed: f64,
+    /// Largest acceleration of a place of the formation \[m/s^2\].
+    pub acceleration: f64,
 }
 
 impl SwarmPlan {
@@ -156,7 +174,14 @@ impl SwarmPlan {
         let leaders = (0..formation.count()).filter(|&m| formation.leads(m)).count();
         let not_linear = not_linear(formation, swarm);
         let convergence = convergence(formation, swarm).filter(|_| not_linear.is_none());
+        let not_predicted = convergence.is_none().then(|| match not_linear {
+            _ if leaders == formation.count() => "every robot leads",
+            Some(why) => why,
+            None => "the rule is not linear",
+        });
         let map = PeriodMap::of(formation, raw.control.sweeps).filter(|_| not_linear.is_none());
+        let lag =
+            lag(swarm, formation, map.as_ref(), convergence).map_err(|why| not_predicted.unwrap_or(why));
         let delay = f64::from(raw.flight.delay) + f64::from(raw.flight.jitter);
         let mut plan = Self {
             name: swarm.name.clone(),
@@ -183,18 +208,19 @@ impl SwarmPlan {
                 room_s: room_for_delay(formation, flight.control().limits()),
                 half_life_s: convergence.and_then(|one| Some(one.half_life_s? * (delay + 1.0))),
             },
-            speed: speed(swarm, formation, map.as_ref(), delay),
+            speed: speed(swarm, &flight, lag, delay),
             exactness: Exactness::of(swarm, formation),
-            not_predicted: convergence.is_none().then(|| match not_linear {
-                _ if leaders == formation.count() => "every robot leads",
-                Some(why) => why,
-                None => "the rule is not linear",
-            }),
+            not_predicted,
             convergence,
             cautions: Vec::new(),
         };
         let real = cautions::late_without_speed(flight.control().limits()).map(str::to_owned);
-        plan.cautions = lasting(&plan).into_iter().chain(cautions::of(swarm, &flight)).chain(real).collect();
+        plan.cautions = lasting(&plan)
+            .into_iter()
+            .chain(cautions::of(swarm, &flight))
+            .chain(beyond_bound(swarm, &plan.speed))
+            .chain(real)
+            .collect();
         Ok(plan)
     }
 }
@@ -268,26 +294,121 @@ fn half_life(factor: f64) -> f64 {
     (0.5_f64.ln() / factor.max(f64::MIN_POSITIVE).ln()).max(1.0)
 }
 
-fn speed(swarm: &Swarm, formation: &Formation, map: Option<&PeriodMap>, delay: f64) -> SpeedMargin {
-    let limit = swarm.raw.limits.speed;
-    let periods = map.and_then(PeriodMap::lag);
-    let lag_s = periods.map(|periods| periods * (delay + 1.0) * swarm.raw.control.period);
-    let lag_per_speed =
-        periods.zip(swarm.raw.limits.acceleration).map(|(periods, most)| periods / (2.0 * most));
-    let felt = lag_s.filter(|lag| *lag >= LEAST_LAG);
-    let by_lag = swarm.raw.flight.bounds.affine_error.zip(felt).map(|(error, lag)| {
-        // The speed at which the way behind, `lag v + more v^2`, is the error.
-        2.0 * error / (lag + (lag * lag + 4.0 * error * lag_per_speed.unwrap_or(0.0)).sqrt())
-    });
-    let reachable = [limit, by_lag].into_iter().flatten().reduce(f64::min).filter(|speed| speed.is_finite());
-    let manoeuvres = swarm.manoeuvres.iter().filter_map(|one| needed(formation, &one.name)).collect();
-    SpeedMargin { limit, lag_s, lag_per_speed, reachable, manoeuvres }
+/// The largest lag of a follower behind leaders that move steadily, as periods without a delay \[1\]; the reason for which it is not
+/// known.
+fn lag(
+    swarm: &Swarm,
+    formation: &Formation,
+    map: Option<&PeriodMap>,
+    convergence: Option<Convergence>,
+) -> Result<f64, &'static str> {
+    if formation.is_led_here() && (0..formation.count()).all(|m| formation.leads(m)) {
+        return Ok(0.0);
+    }
+    if let Some(map) = map {
+        return map.lag().ok_or(NEVER_STEADY);
+    }
+    let Convergence { factor, .. } = convergence.ok_or("the rule is not linear")?;
+    if factor >= 1.0 {
+        return Err(NEVER_STEADY);
+    }
+    lag_when_led(formation, swarm.raw.control.sweeps, factor).ok_or("it would take long for so many robots")
 }
 
-/// The largest speed of a place in a manoeuvre.
+fn speed(swarm: &Swarm, flight: &Flight, lag: Result<f64, &'static str>, delay: f64) -> SpeedMargin {
+    let (raw, formation) = (&swarm.raw, flight.control().formation());
+    let (limit, bound, period) = (raw.limits.speed, raw.flight.bounds.affine_error, raw.control.period);
+    let follow = (0..formation.count()).any(|m| !formation.leads(m));
+    let lags = lag.ok().filter(|_| follow);
+    let braking = raw.limits.acceleration.zip(lags);
+    let in_time = |periods: f64| periods * (delay + 1.0) * period;
+    let reachable = match (bound, lag) {
+        (None, _) => limit,
+        (Some(_), Err(_)) => None,
+        (Some(error), Ok(periods)) => {
+            let by_lag = reachable(error, in_time(periods), periods + 1.0, flight.control().limits(), period);
+            [limit, by_lag].into_iter().flatten().reduce(f64::min)
+        }
+    };
+    SpeedMargin {
+        limit,
+        lag_s: lags.map(in_time),
+        lag_not_known: lag.err(),
+        lag_per_speed: braking.map(|(most, periods)| periods / (2.0 * most)),
+        least_braking_lag_s: braking
+            .filter(|_| flight.control().limits().brakes)
+            .map(|(_, periods)| 0.5 * periods * period),
+        bound,
+        reachable,
+        manoeuvres: swarm.manoeuvres.iter().filter_map(|one| needed(formation, &one.name)).collect(),
+    }
+}
+
+/// The speed at which the way behind a program, the lag's and so many braking ways, is the error \[m\]; `None` where no speed is.
+fn reachable(error: f64, lag: f64, ways: f64, limits: &Limits, period: f64) -> Option<f64> {
+    /// Halvings of the interval in which it is: to all its digits.
+    const HALVINGS: usize = 60;
+    // A smaller lag allows far more than the speed of any robot.
+    let by_lag = if lag >= LEAST_LAG { error / lag } else { f64::INFINITY };
+    let highest = by_lag.min((2.0 * limits.acceleration * error / ways).sqrt());
+    if highest.is_infinite() {
+        return None;
+    }
+    let behind = |speed: f64| lag * speed + ways * braking_way(speed, limits, period);
+    let (mut low, mut high) = (0.0, highest);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if behind(middle) <= error {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    Some(high)
+}
+
+/// How far behind its target a robot is kept at a steady speed, by a limit of acceleration \[m\].
+fn braking_way(speed: f64, limits: &Limits, period: f64) -> f64 {
+    let (dynamics, most) =
+        (DoubleIntegrator { speed: f64::INFINITY, acceleration: limits.acceleration }, limits.acceleration);
+    match () {
+        () if most.is_infinite() => 0.0,
+        () if limits.brakes => dynamics.braking_way([speed, 0.0], period)[0],
+        () => speed * speed / (2.0 * most),
+    }
+}
+
+/// The largest speed and acceleration of a place in a manoeuvre.
 fn needed(formation: &Formation, name: &str) -> Option<ManoeuvreSpeed> {
-    let needed = formation.manoeuvre(name, 0.0)?.demand(&formation.places).speed;
-    Some(ManoeuvreSpeed { name: name.to_owned(), needed })
+    let Demand { speed: needed, acceleration } = formation.manoeuvre(name, 0.0)?.demand(&formation.places);
+    Some(ManoeuvreSpeed { name: name.to_owned(), needed, acceleration })
+}
+
+/// Manoeuvres within the speed limit, but too fast for the bound.
+fn beyond_bound<'a>(swarm: &'a Swarm, speed: &'a SpeedMargin) -> impl Iterator<Item = String> + 'a {
+    let limit = speed.limit.unwrap_or(f64::INFINITY);
+    let too_fast = move |(bound, reachable): (f64, f64)| {
+        // Robots that would lag by that time fall behind by a part of it alone in a leg that is shorter.
+        let lag = bound / reachable;
+        let brief = move |name: &str| {
+            let all = swarm.manoeuvres.iter().filter(move |one| one.name == name);
+            let shortest = all.flat_map(|one| &one.legs).map(|leg| leg.seconds).reduce(f64::min);
+            1.0 - (-0.5 * shortest.unwrap_or(0.0) / lag).exp()
+        };
+        let is_fast = move |one: &&ManoeuvreSpeed| {
+            !at_most(one.needed * brief(&one.name), reachable) && at_most(one.needed, limit)
+        };
+        let words = move |ManoeuvreSpeed { name, needed, .. }: &ManoeuvreSpeed| {
+            let [needed, reachable] = [*needed, reachable].map(|speed| decimals(speed, 3));
+            format!(
+                "manoeuvre `{name}` moves a robot's place at up to {needed} m/s, and steadily led robots are within \
+                 flight.bounds.affine_error = {bound} m of their places up to {reachable} m/s: give its legs more seconds, or \
+                 raise the bound"
+            )
+        };
+        speed.manoeuvres.iter().filter(is_fast).map(words)
+    };
+    speed.bound.zip(speed.reachable).into_iter().flat_map(too_fast)
 }
 
 fn lasting(plan: &SwarmPlan) -> Option<String> {

@@ -2,11 +2,17 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::flock::vectors::Vectors;
+use crate::flock::vectors::{Vectors, distance};
 use crate::swarm::formation::{Formation, Seen};
 
 /// Most followers for the dense algebra of noise and lag: more would take seconds.
 const MOST_FOLLOWERS: usize = 150;
+
+/// Part of the lag of a formation that is led until its lag is steady that may be missing \[1\].
+const STEADY: f64 = 1e-6;
+
+/// Most targets of single robots in that, one for each sweep: more would take seconds.
+const MOST_TARGETS: f64 = 3e7;
 
 /// One period of the loop as a map of what is seen.
 pub(super) struct PeriodMap {
@@ -68,6 +74,39 @@ impl PeriodMap {
         };
         Some(along(0)?.max(along(1)?)).filter(|lag| lag.is_finite())
     }
+}
+
+/// The largest lag of a follower behind leaders that move by 1 in a period \[period\], by leading the formation until its lag is steady:
+/// it forgets all but `factor` of what it lacks of that in a period. `None` where that takes long.
+pub(super) fn lag_when_led(formation: &Formation, sweeps: usize, factor: f64) -> Option<f64> {
+    let periods = (STEADY.ln() / factor.max(f64::MIN_POSITIVE).ln()).ceil() + 1.0;
+    if periods * (sweeps * formation.count()) as f64 > MOST_TARGETS {
+        return None;
+    }
+    let pace = formation.spacing();
+    let along = |axis: usize| {
+        let (mut formation, places) = (formation.clone(), &formation.places);
+        let moved = |m: usize, way: f64| {
+            let mut place = places.get(m);
+            place[axis] += way;
+            place
+        };
+        let all = vec![true; formation.count()];
+        let mut present = places.clone();
+        let mut targets = present.clone();
+        for period in 1..=periods as usize {
+            for m in 0..formation.count() {
+                // Of the leaders alone.
+                formation.take_over(m, moved(m, pace * period as f64), 0.0);
+            }
+            let seen = Seen { present: &present, known: &all };
+            formation.advance(&seen, &mut [], 0.0, sweeps, &mut targets);
+            present.clone_from(&targets);
+        }
+        let behind = |m: usize| distance(moved(m, pace * periods), present.get(m)) / pace;
+        (0..formation.count()).map(behind).fold(0.0, f64::max)
+    };
+    Some(along(0).max(along(1))).filter(|lag| lag.is_finite())
 }
 
 /// The members' places after a period at whose start one of them is seen a metre off.

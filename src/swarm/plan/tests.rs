@@ -1,6 +1,9 @@
 //! Plans against what is computed by hand, and against flights.
 
+mod speed;
+
 use super::*;
+use crate::flock::vectors::Vectors;
 use crate::scene::bundled::bundled_swarm;
 
 fn plan(name: &str, set: &[&str]) -> SwarmPlan {
@@ -223,6 +226,63 @@ fn a_steadily_led_formation_lags_as_its_plan_says_under_delay_too() {
 }
 
 #[test]
+fn followers_and_short_ways_are_looked_at_for_where_programs_lead_too() {
+    let set = |more: &str| {
+        plan(
+            "square",
+            &[
+                "manoeuvres=[{ name = \"turn\", legs = [{ seconds = 20.0, translate = [10.0, 0.0] }] }]",
+                "limits={ speed = 1.0, clearance = 0.1 }",
+                more,
+            ],
+        )
+        .cautions
+    };
+    // The middle of the square comes to (13, 3).
+    let disc =
+        |x: f64| set(&format!("obstacles=[{{ kind = \"disc\", centre = [{x:?}, 3.0], radius = 0.5 }}]"));
+    let words =
+        "programs end with these robots' places in an obstacle, before which they will stop: `robot_13`;";
+    assert!(matches!(&disc(13.0)[..], [one] if one.contains(words)), "{:?}", disc(13.0));
+    assert_eq!(disc(13.75), [""; 0]);
+    let fence = |notch: f64| {
+        let corners = format!(
+            "[-9.0, -9.0], [29.0, -9.0], [29.0, 2.5], [{notch:?}, 2.5], [{notch:?}, 3.5], [29.0, 3.5], [29.0, 9.0], [-9.0, 9.0]"
+        );
+        set(&format!("limits.geofence=[{corners}]"))
+    };
+    let words = "programs lead these robots out of limits.geofence: `robot_23`;";
+    assert!(matches!(&fence(16.1)[..], [one] if one.contains(words)), "{:?}", fence(16.1));
+    assert_eq!(fence(16.3), [""; 0]);
+    // Beyond the fence for some seconds of six thousand.
+    let excursion = |x: f64| {
+        let points = format!(
+            "points = [{{ at = 26.0, displacement = [{x:?}, 0.0] }}, {{ at = 52.0, displacement = [0.0, 0.0] }}, \
+             {{ at = 6000.0, displacement = [0.0, 0.0] }}]"
+        );
+        let path = format!("leaders[0].program={{ kind = \"path\", {points} }}");
+        let fence = "limits.geofence=[[-9.0, -9.0], [12.0, -9.0], [12.0, 9.0], [-9.0, 9.0]]";
+        plan("square", &[&path, fence]).cautions
+    };
+    let words = "programs lead these robots out of limits.geofence: `robot_21`, `robot_22`, ";
+    assert!(matches!(&excursion(6.0)[..], [one] if one.contains(words)), "{:?}", excursion(6.0));
+    assert_eq!(excursion(5.7), [""; 0]);
+}
+
+#[test]
+fn a_program_that_begins_elsewhere_than_its_robot_leaps() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("ways.csv");
+    std::fs::write(&file, "t,dx,dy\n0,5,0\n9,6,0\n").expect("written");
+    let begun = |start: &str| cautions_of_two(&format!("kind = \"file\", path = {file:?}"), start);
+    let words =
+        "the program of leaders[0] leaps by up to 5.000 m, farther than limits.speed leads in a period";
+    assert!(matches!(&begun("")[..], [one] if one.contains(words)), "{:?}", begun(""));
+    let start = "flight = { start = [{ robot = \"a\", place = [4.0, 0.0] }, { robot = \"b\", place = [6.0, 0.0] }] }\n";
+    assert_eq!(begun(start), [""; 0]);
+}
+
+#[test]
 fn nothing_is_predicted_of_a_loop_that_is_not_linear_and_the_plan_says_why() {
     let reason = |plan: &SwarmPlan| {
         let numbers = (plan.convergence, plan.noise.gain, plan.speed.lag_s, plan.delay.half_life_s);
@@ -298,4 +358,24 @@ fn solved_weights_follow_every_affine_motion_and_equal_ones_shifts_alone() {
     }
     let predicted = equal.manoeuvres[0].largest;
     assert!(predicted > 0.1 && (flown / predicted - 1.0).abs() < 0.02, "{flown} beside {predicted}");
+}
+
+#[test]
+fn followers_are_nowhere_on_the_way_farther_off_than_the_plan_says() {
+    let turn = "manoeuvres=[{ name = \"turn\", legs = [{ seconds = 70.0, rotate = 250.0 }] }]";
+    let set = ["rule={ rest = \"balanced\" }", turn].map(str::to_owned);
+    let swarm = bundled_swarm("square").expect("bundled").load_swarm(&set).expect("loads");
+    let flight = Flight::new(&swarm).expect("laid out");
+    let formation = flight.control().formation();
+    let manoeuvre = formation.manoeuvre("turn", 0.0).expect("there");
+    let off = |time: f64| {
+        let affine = manoeuvre.affine(time);
+        let places: Vectors = formation.places.iter().map(|place| affine.apply(place)).collect();
+        let rest = formation.settled(&places).expect("linear");
+        (0..places.len()).map(|m| distance(places.get(m), rest.get(m))).fold(0.0, f64::max)
+    };
+    // Half a turn from where they were.
+    let farthest = (0..=40_000).map(|k| off(70.0 * f64::from(k) / 40_000.0)).fold(0.0, f64::max);
+    let found = plan("square", &[&set[0], turn]).exactness.expect("linear").manoeuvres[0].largest;
+    assert!((found / farthest - 1.0).abs() < 1e-7, "{found} beside {farthest}");
 }

@@ -82,29 +82,58 @@ impl fmt::Display for SwarmPlan {
             None => "no two robots have a clearance to keep".to_owned(),
         };
         line("noise margin", format!("{held}; simulated {} m", self.noise.simulated))?;
-        let SpeedMargin { limit, lag_s, lag_per_speed, reachable, manoeuvres } = &self.speed;
-        line("speed limit", limit.map_or("none".into(), |limit| format!("{limit} m/s")))?;
-        if let Some(lag) = lag_s {
-            let more = lag_per_speed.filter(|more| *more >= NOTHING).map_or(String::new(), |more| {
-                format!(", and {more:.3} s more for each m/s of them, by the acceleration limit")
-            });
-            line("lag", format!("followers are up to {lag:.3} s behind steady leaders{more}"))?;
-        }
-        match (reachable, lag_s) {
-            (Some(speed), _) => line("reachable speed", format!("{speed:.4} m/s"))?,
-            (None, Some(lag)) if *lag < NOTHING => line(
-                "reachable speed",
-                format!("not limited: {model} robots, with the rule, keep up at any"),
-            )?,
-            (None, _) => {}
-        }
-        for ManoeuvreSpeed { name, needed } in manoeuvres {
-            line("manoeuvre", format!("`{name}` moves a place at up to {} m/s", decimals(*needed, 3)))?;
+        for (name, words) in self.speed.in_words(model) {
+            line(name, words)?;
         }
         for words in self.exactness.iter().flat_map(Exactness::in_words) {
             line("exact", words)?;
         }
         self.cautions.iter().try_for_each(|caution| writeln!(f, "caution: {caution}"))
+    }
+}
+
+impl SpeedMargin {
+    /// Each line's name and words.
+    fn in_words(&self, model: &str) -> Vec<(&'static str, String)> {
+        let Self { limit, lag_s, lag_not_known, bound, reachable, manoeuvres, .. } = self;
+        let mut lines = vec![("speed limit", limit.map_or("none".into(), |limit| format!("{limit} m/s")))];
+        if let Some(lag) = lag_s {
+            let more = self.lag_per_speed.filter(|more| *more >= NOTHING).map_or(String::new(), |more| {
+                let least = self.least_braking_lag_s.filter(|least| *least >= NOTHING);
+                let least = least.map_or(String::new(), |least| format!(", {least:.3} s at least"));
+                format!(", and {more:.3} s more for each m/s of them{least}, by the acceleration limit")
+            });
+            lines.push(("lag", format!("followers are up to {lag:.3} s behind steady leaders{more}")));
+        }
+        if let Some(why) = lag_not_known {
+            lines.push(("lag", format!("not computed: {why}")));
+        }
+        let within = match bound {
+            Some(bound) => {
+                format!("with robots within flight.bounds.affine_error = {bound} m of their places")
+            }
+            None => "the speed limit: no flight.bounds.affine_error bounds how far they lag".to_owned(),
+        };
+        match (reachable, lag_s, lag_not_known) {
+            (Some(speed), ..) => lines.push(("reachable speed", format!("{speed:.4} m/s, {within}"))),
+            (None, _, Some(_)) if bound.is_some() => {
+                lines.push(("reachable speed", "not computed, as the lag is not".to_owned()));
+            }
+            (None, Some(lag), _) if *lag < NOTHING => lines.push((
+                "reachable speed",
+                format!("not limited: {model} robots, with the rule, keep up at any"),
+            )),
+            _ => {}
+        }
+        let of_one = |ManoeuvreSpeed { name, needed, acceleration }: &ManoeuvreSpeed| {
+            let [speed, acceleration] = [needed, acceleration].map(|value| decimals(*value, 3));
+            (
+                "manoeuvre",
+                format!("`{name}` moves a place at up to {speed} m/s, by up to {acceleration} m/s^2"),
+            )
+        };
+        lines.extend(manoeuvres.iter().map(of_one));
+        lines
     }
 }
 

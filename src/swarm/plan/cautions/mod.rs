@@ -5,21 +5,24 @@ mod network;
 use super::{ManoeuvreSpeed, needed};
 use crate::continuum::late::beyond;
 use crate::flock::block::apply;
-use crate::flock::manoeuvre::Manoeuvre;
+use crate::flock::manoeuvre::{Leg, Manoeuvre};
 use crate::flock::motion::{Interpolation, Keyframe, Motion};
 use crate::flock::rounding::{ROUNDING, at_most};
-use crate::flock::vectors::distance;
+use crate::flock::vectors::{Vectors, distance};
 use crate::geometry::point::minus;
+use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::{RawCommandKind, RawSwarm};
-use crate::scene::swarm::{Program, Swarm};
 use crate::scene::text::{decimals, number};
 use crate::swarm::flight::{Flight, lasts};
-use crate::swarm::formation::{Formation, first_few};
+use crate::swarm::formation::{Formation, Lead, first_few};
 use crate::swarm::safety::foot;
 pub use network::{late_without_speed, of_real_robots};
 
-/// Parts of a leg or of a program between which a leader's way is looked at.
+/// Parts of a leg, or of a program's way from one point to the next, between which a leader's way is looked at.
 const PARTS: usize = 40;
+
+/// Most times at which those that follow are looked at: a program may have thousands of points.
+const MOST_LOOKS: usize = 1000;
 
 /// All of them.
 pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
@@ -44,7 +47,7 @@ pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
     ];
     let fast = fast_manoeuvres(raw, formation)
         .chain(fast_paths(swarm, formation))
-        .chain(leaping_paths(swarm, formation));
+        .chain(leaping_paths(swarm, flight));
     let commanded = commanded_astray(raw, flight);
     network::of(raw, flight)
         .into_iter()
@@ -149,12 +152,7 @@ fn out_of_range_at_the_start(flight: &Flight, raw: &RawSwarm) -> Option<String> 
 
 fn led_outside(flight: &Flight) -> Option<String> {
     let (filter, formation) = (flight.control().filter(), flight.control().formation());
-    let end = Some(formation.programs_end()).filter(|end| end.is_finite())?;
-    let leaves = |m: usize| {
-        let is_in = |place| filter.is_fenced_in(place, formation.radii[m] - ROUNDING);
-        !along(formation, m, end).all(is_in)
-    };
-    let names = formation.named(leaves)?;
+    let names = led_where(flight, &|m, place| !filter.is_fenced_in(place, formation.radii[m] - ROUNDING))?;
     Some(format!(
         "programs lead these robots out of limits.geofence: {names}; they will stop at the fence: widen it, or change their \
          programs"
@@ -162,12 +160,7 @@ fn led_outside(flight: &Flight) -> Option<String> {
 }
 
 fn led_out_of_range(flight: &Flight, raw: &RawSwarm) -> Option<String> {
-    let (control, formation) = (flight.control(), flight.control().formation());
-    let programs_end = formation.programs_end();
-    let is_endless = programs_end.is_infinite();
-    let end = if is_endless { flight.periods() as f64 * control.period() } else { programs_end };
-    let is_lost = |m: usize| !along(formation, m, end).all(|place| control.is_believed(place));
-    let names = formation.named(is_lost)?;
+    let names = led_where(flight, &|_, place| !flight.control().is_believed(place))?;
     Some(format!(
         "programs lead these robots farther than poses.range = {} m from the formation's middle, where no pose is \
          believed: {names}; raise it, or change their programs",
@@ -175,10 +168,60 @@ fn led_out_of_range(flight: &Flight, raw: &RawSwarm) -> Option<String> {
     ))
 }
 
-/// Places to which a leader's program sends it until `end` \[s\]; none of a follower.
-fn along(formation: &Formation, member: usize, end: f64) -> impl Iterator<Item = [f64; 2]> + '_ {
-    let at = move |k: usize| formation.led_to(member, end * k as f64 / (4 * PARTS) as f64);
-    (0..=4 * PARTS).filter_map(at)
+/// Robots that programs lead to a bad place, or that follow to one and are not laid out at such a one.
+fn led_where(flight: &Flight, is_bad: &dyn Fn(usize, [f64; 2]) -> bool) -> Option<String> {
+    let (control, formation) = (flight.control(), flight.control().formation());
+    let end = match formation.programs_end() {
+        end if end.is_finite() => end,
+        _ => flight.periods() as f64 * control.period(),
+    };
+    // Where several programs lead, those that follow are looked at by the first.
+    let times = looks((0..formation.count()).find_map(|m| formation.lead(m)), end);
+    let thinned = times.iter().step_by(times.len().div_ceil(MOST_LOOKS));
+    let places: Vec<Vectors> = thinned.filter_map(|&time| rest(formation, time)).collect();
+    formation.named(|m| match formation.lead(m) {
+        lead @ Some(_) => {
+            let mut led = looks(lead, end).into_iter().filter_map(|time| formation.led_to(m, time));
+            led.any(|place| is_bad(m, place))
+        }
+        None => !is_bad(m, formation.places.get(m)) && places.iter().any(|all| is_bad(m, all.get(m))),
+    })
+}
+
+/// Places at which the members rest behind leaders that are where their programs have them at `time` \[s\]; `None` where that is not
+/// known.
+fn rest(formation: &Formation, time: f64) -> Option<Vectors> {
+    let led = |m: usize| formation.led_to(m, time).unwrap_or_else(|| formation.places.get(m));
+    formation.is_led_here().then(|| formation.settled(&(0..formation.count()).map(led).collect()))?
+}
+
+/// Times at which a leader's way is looked at, until `end` \[s\]: within each of its parts, however short.
+fn looks(lead: Option<&Lead>, end: f64) -> Vec<f64> {
+    let ends: Vec<f64> = match lead {
+        Some(Lead::Motion { motion: Motion::Keyframes { frames, .. }, since }) => {
+            frames.iter().map(|frame| since + frame.step).collect()
+        }
+        // It repeats.
+        Some(Lead::Motion { motion: Motion::Sinusoid { period, .. }, since }) => {
+            (1..=4).map(|quarter| since + 0.25 * period * f64::from(quarter)).collect()
+        }
+        Some(Lead::Manoeuvre { manoeuvre, since }) => {
+            let whole = |begun: &mut f64, leg: &Leg| {
+                let end = *begun + leg.seconds;
+                *begun = end + leg.hold;
+                Some(end)
+            };
+            manoeuvre.legs.iter().scan(*since, whole).collect()
+        }
+        Some(Lead::External(_) | Lead::Motion { .. }) | None => {
+            (1..4).map(|quarter| 0.25 * end * f64::from(quarter)).collect()
+        }
+    };
+    let mut ends: Vec<f64> = ends.into_iter().filter(|time| *time < end).collect();
+    ends.insert(0, 0.0);
+    ends.push(end);
+    let part = |pair: &[f64], k: usize| pair[0] + (pair[1] - pair[0]) * k as f64 / PARTS as f64;
+    ends.windows(2).flat_map(|pair| (0..=PARTS).map(move |k| part(pair, k))).collect()
 }
 
 /// Robots whose places in the formation are taken by an obstacle, wherever they start.
@@ -193,7 +236,12 @@ fn led_into_solids(flight: &Flight) -> Option<String> {
     let (obstacles, formation) = (flight.control().filter().obstacles(), flight.control().formation());
     let end = Some(formation.programs_end()).filter(|end| end.is_finite() && *end > 0.0)?;
     let is_in_one = |place: [f64; 2], m: usize| obstacles.distance(place) < formation.radii[m] - ROUNDING;
-    let names = formation.named(|m| formation.led_to(m, end).is_some_and(|place| is_in_one(place, m)))?;
+    let at_rest = rest(formation, end);
+    let place = |m: usize| match formation.led_to(m, end) {
+        None => Some(at_rest.as_ref()?.get(m)).filter(|_| !is_in_one(formation.places.get(m), m)),
+        led => led,
+    };
+    let names = formation.named(|m| place(m).is_some_and(|place| is_in_one(place, m)))?;
     Some(format!(
         "programs end with these robots' places in an obstacle, before which they will stop: {names}; move it, or \
          change their programs"
@@ -217,22 +265,30 @@ fn commanded_astray<'a>(raw: &'a RawSwarm, flight: &'a Flight) -> impl Iterator<
 }
 
 fn fast_manoeuvres(raw: &RawSwarm, formation: &Formation) -> impl Iterator<Item = String> {
-    let limit = raw.limits.speed.unwrap_or(f64::INFINITY);
+    let [fastest, most] =
+        [raw.limits.speed, raw.limits.acceleration].map(|limit| limit.unwrap_or(f64::INFINITY));
     let all = raw.manoeuvres.iter().filter_map(|one| needed(formation, &one.name));
-    let fast = all.filter(move |one| !at_most(one.needed, limit));
-    fast.map(|ManoeuvreSpeed { name, needed }| {
-        format!(
-            "manoeuvre `{name}` moves a robot's place at up to {} m/s, above limits.speed: robots will fall \
-             behind; give its legs more seconds",
-            decimals(needed, 3)
-        )
+    all.flat_map(move |ManoeuvreSpeed { name, needed, acceleration }| {
+        let asked = [
+            (needed, fastest, "moves a robot's place at up to", "m/s, above limits.speed"),
+            (acceleration, most, "changes a place's velocity by up to", "m/s^2, above limits.acceleration"),
+        ];
+        let above = asked.into_iter().filter(|(value, limit, ..)| !at_most(*value, *limit));
+        let words = above.map(|(value, _, asks, limit)| format!("{asks} {} {limit}", decimals(value, 3)));
+        let words: Vec<String> = words.collect();
+        (!words.is_empty()).then(|| {
+            format!(
+                "manoeuvre `{name}` {}: robots will fall behind; give its legs more seconds",
+                words.join(", and ")
+            )
+        })
     })
 }
 
 fn fast_paths(swarm: &Swarm, formation: &Formation) -> impl Iterator<Item = String> {
     let limit = swarm.raw.limits.speed.unwrap_or(f64::INFINITY);
     (0..swarm.leaders.len()).filter_map(move |k| {
-        let fastest = motions(swarm, formation, k).map(speed).fold(0.0, f64::max);
+        let fastest = motions(formation, k).map(|(_, motion)| speed(motion)).fold(0.0, f64::max);
         (!at_most(fastest, limit)).then(|| {
             format!(
                 "the program of leaders[{k}] moves a robot at up to {} m/s, above limits.speed: it will fall \
@@ -243,38 +299,43 @@ fn fast_paths(swarm: &Swarm, formation: &Formation) -> impl Iterator<Item = Stri
     })
 }
 
-fn leaping_paths(swarm: &Swarm, formation: &Formation) -> impl Iterator<Item = String> {
+fn leaping_paths(swarm: &Swarm, flight: &Flight) -> impl Iterator<Item = String> {
+    let (formation, robots) = (flight.control().formation(), flight.fleet().robots());
     let reach = swarm.raw.limits.speed.unwrap_or(f64::INFINITY) * swarm.raw.control.period;
     (0..swarm.leaders.len()).filter_map(move |k| {
-        let farthest = motions(swarm, formation, k).map(leap).fold(0.0, f64::max);
+        let leap = |(m, motion): (usize, &Motion)| leap(motion, minus(robots[m].position, formation.places.get(m)));
+        let farthest = motions(formation, k).map(leap).fold(0.0, f64::max);
         (!at_most(farthest, reach)).then(|| {
             format!(
                 "the program of leaders[{k}] leaps by up to {} m, farther than limits.speed leads in a period: the robot \
-                 will be on its way for a while; interpolate it \"linear\" or \"smooth\"",
+                 will be on its way for a while; interpolate it \"linear\" or \"smooth\", from where the robot starts",
                 decimals(farthest, 3)
             )
         })
     })
 }
 
-/// Those by points in the program of an entry of leaders. One file may have rows for robots of other entries too.
-fn motions<'a>(swarm: &'a Swarm, formation: &Formation, entry: usize) -> impl Iterator<Item = &'a Motion> {
-    let number = |name: &String| formation.names.iter().position(|one| one == name);
-    let is_led = move |name: &String| number(name).and_then(|m| formation.entry(m)) == Some(entry);
-    let (one, several) = match &swarm.leaders[entry].program {
-        Program::Motion(motion) => (Some(motion), &[][..]),
-        Program::Individual(tracks) => (None, &tracks[..]),
-        Program::External | Program::Manoeuvre(_) => (None, &[][..]),
-    };
-    one.into_iter().chain(several.iter().filter(move |(name, _)| is_led(name)).map(|(_, motion)| motion))
+/// Those by points of robots that an entry of leaders leads.
+fn motions(formation: &Formation, entry: usize) -> impl Iterator<Item = (usize, &Motion)> {
+    let led = (0..formation.count()).filter(move |&m| formation.entry(m) == Some(entry));
+    led.filter_map(|m| match formation.lead(m)? {
+        Lead::Motion { motion, .. } => Some((m, motion)),
+        Lead::External(_) | Lead::Manoeuvre { .. } => None,
+    })
 }
 
-/// Largest leap of a program that holds each of its points until the next \[m\].
-fn leap(motion: &Motion) -> f64 {
-    let Motion::Keyframes { frames, interpolation: Interpolation::Hold } = motion else { return 0.0 };
-    let ends = frames.iter().map(|frame| frame.displacement);
-    let begins = std::iter::once([0.0; 2]).chain(ends.clone());
-    begins.zip(ends).map(|(from, to)| distance(from, to)).fold(0.0, f64::max)
+/// Largest leap of a program that holds each of its points until the next, or begins with one at once \[m\]; `start` is the
+/// robot's displacement as it begins.
+fn leap(motion: &Motion, start: [f64; 2]) -> f64 {
+    let Motion::Keyframes { frames, interpolation } = motion else { return 0.0 };
+    let at_once = frames.first().is_some_and(|frame| frame.step <= 0.0);
+    let start = Keyframe { step: 0.0, displacement: if at_once { start } else { [0.0; 2] } };
+    let begins = std::iter::once(&start).chain(frames);
+    let leaps = begins
+        .zip(frames)
+        .filter(|(from, to)| *interpolation == Interpolation::Hold || to.step <= from.step)
+        .map(|(from, to)| distance(from.displacement, to.displacement));
+    leaps.fold(0.0, f64::max)
 }
 
 /// Largest speed of a program by keyframes that goes from one to the next \[m/s\].
