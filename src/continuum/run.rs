@@ -39,6 +39,9 @@ pub enum StopReason {
 }
 
 impl StopReason {
+    /// The name of [`StopReason::Diverged`] in reports.
+    pub const DIVERGED: &'static str = "diverged";
+
     /// The name in reports.
     pub fn name(&self) -> &'static str {
         match self {
@@ -47,7 +50,7 @@ impl StopReason {
             StopReason::Stuck(_) => "stuck",
             StopReason::Steps => "steps",
             StopReason::Interrupted => "interrupted",
-            StopReason::Diverged(_) => "diverged",
+            StopReason::Diverged(_) => Self::DIVERGED,
         }
     }
 
