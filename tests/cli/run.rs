@@ -121,6 +121,8 @@ fn a_run_that_diverges_fails_names_the_cause_and_keeps_the_last_good_state() {
     let said = failed(&arguments, folder.path());
     assert!(said.contains("diverged at step") && said.contains("particle"), "{said}");
     assert!(said.contains("feedback factor 1"), "{said}");
+    // Its frame takes no feedback.
+    assert!(said.contains("`flockform stability`") && !said.contains("spectral radius"), "{said}");
     let summary = json_in(&folder.path().join("o/summary.json"));
     assert_eq!(summary["stop_reason"], "diverged");
     let table = std::fs::read_to_string(folder.path().join("o/final.csv")).expect("written");
@@ -560,6 +562,7 @@ fn a_sweep_that_grows_is_warned_of_before_it_diverges_and_one_that_rests_is_not(
     let grown = ["rule.feedback={ factor = 0.2 }", "stop.steps=45", "frame=\"none\"", "record.probes=[]"];
     let said = said_by_run("tension", &grown);
     assert!(said.contains("the sweep grows from step to step: feedback factor 0.2"), "{said}");
+    assert!(said.contains("once |1 + factor| times its spectral radius exceeds 1"), "{said}");
     let at_rest = [
         "rule.feedback={ factor = 0.002, reference = \"previous\" }",
         "stop={ steps = 20000, tolerance = 1e-9 }",
