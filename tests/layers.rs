@@ -211,9 +211,10 @@ fn threads_share_a_body_in_the_schedule_and_where_a_solver_or_a_report_goes_over
     let known = [
         "engine/forces.rs",
         "engine/movement.rs",
-        "solve/corotated.rs",
+        "solve/corotated/body.rs",
         "solve/equilibrium/steps.rs",
         "solve/equilibrium/windows/tests.rs",
+        "solve/refined.rs",
         "sweep/mod.rs",
         "sweep/schedule.rs",
         "sweep/schedule/tests.rs",

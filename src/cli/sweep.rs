@@ -180,7 +180,8 @@ impl Sweep {
             rows: &self.rows,
         };
         if let Some(name) = arguments.plot.as_deref().filter(|name| !table.has_numbers(name)) {
-            note!("caution: `{name}` is a number in no run, so that there is nothing to draw");
+            let but = if table.diverged() > 0 { " that did not diverge" } else { "" };
+            note!("caution: `{name}` is a number in no run{but}, so that there is nothing to draw");
         }
         if let Some(caution) = self.ids_elsewhere() {
             note!("caution: {caution}");

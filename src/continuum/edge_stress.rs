@@ -1,7 +1,7 @@
 //! Stress of the particles along a fitted outline, from the cells near them and the tractions that are known there.
 //!
 //! A field of the recovery ([`crate::material::recovery`]) goes on in one material and without body force alone. So each
-//! particle is given the cells of its own material that hang together with its own, as across no slot, and that no other
+//! particle is given the cells of its own material that hang together with its own, as across no slot and no line of forces, and that no other
 //! material hides from it, with the tractions on their sides;
 //! and of a body force that part of the stress is taken off which balances it, `-b_x (x - x_0)` and `-b_y (y - y_0)`
 //! about the particle: linear, hence compatible in every material, and zero where the result is wanted.
@@ -53,6 +53,8 @@ struct Patch {
 enum LeftOut {
     /// Cells of several materials meet there, and stress has no single value.
     Interface,
+    /// A line of forces ends there, at which stress jumps.
+    Line,
     /// Too few cells near it.
     Few,
 }
@@ -123,6 +125,9 @@ impl<'a> Patches<'a> {
         let of_region = |cell: u32| self.cells.region_of(cell as usize) == region;
         let is_mixed = !all.iter().all(|&cell| of_region(cell));
         let reached = self.reached(particle, &all);
+        if self.incidence.of(particle).iter().any(|cell| !reached.contains(cell)) {
+            return Err(LeftOut::Line);
+        }
         let is_seen = |cell: u32| !is_mixed || (of_region(cell) && self.sees(point, cell, &all));
         let is_apart = reached.len() < all.len();
         let cells: Vec<u32> = all
@@ -146,14 +151,22 @@ impl<'a> Patches<'a> {
         Ok(Patch { region, cells, tractions })
     }
 
-    /// Those of the cells that hang together with the particle's own, from corner to corner: stress goes through no slot.
+    /// Those of the cells that hang together with the first of the particle's own, from corner to corner: stress goes through no slot, and jumps
+    /// where particles in line are pushed.
     fn reached(&self, particle: usize, all: &[u32]) -> Vec<u32> {
-        let own = self.incidence.of(particle);
-        let (mut reached, mut left): (Vec<u32>, Vec<u32>) = all.iter().partition(|cell| own.contains(cell));
+        let first = self.incidence.of(particle).first();
+        let (mut reached, mut left): (Vec<u32>, Vec<u32>) = all.iter().partition(|&cell| Some(cell) == first);
         let mut next = 0;
         while next < reached.len() && !left.is_empty() {
             let corners = self.cells.of(reached[next] as usize);
-            let touches = |cell: &u32| self.cells.of(*cell as usize).iter().any(|i| corners.contains(i));
+            let is_pushed = |i: &u32| self.edge.pushed[*i as usize];
+            let is_among_pushed = corners.iter().all(is_pushed);
+            let touches = |cell: &u32| {
+                let others = self.cells.of(*cell as usize);
+                // Those within pushed ones are on no line.
+                let passes = is_among_pushed || others.iter().all(is_pushed);
+                others.iter().any(|i| corners.contains(i) && (passes || !is_pushed(i)))
+            };
             reached.extend(left.extract_if(.., |cell| touches(cell)));
             next += 1;
         }
@@ -331,7 +344,7 @@ pub(super) fn cautions(
         count(known().filter(is_one).count())
     };
     let [hollow, steep] = [false, true].map(in_hollows);
-    let (interface, few) = (left_out(LeftOut::Interface), left_out(LeftOut::Few));
+    let [interface, line, few] = [LeftOut::Interface, LeftOut::Line, LeftOut::Few].map(left_out);
     let mut cautions = Vec::new();
     if edge.narrow > 0 {
         cautions.push(format!(
@@ -344,6 +357,12 @@ pub(super) fn cautions(
         cautions.push(format!(
             "stress is not recovered at {interface} particles of the outline where materials meet: it has no single value \
              there, and what is given is the mean of the cells on the side where von Mises stress is larger"
+        ));
+    }
+    if line > 0 {
+        cautions.push(format!(
+            "stress is not recovered at {line} particles of the outline where lines of forces end: it jumps there, and what is \
+             given is the mean of the cells on both sides"
         ));
     }
     if few > 0 {

@@ -39,6 +39,9 @@ pub enum StopReason {
 }
 
 impl StopReason {
+    /// The name of [`StopReason::Diverged`] in reports.
+    pub const DIVERGED: &'static str = "diverged";
+
     /// The name in reports.
     pub fn name(&self) -> &'static str {
         match self {
@@ -47,7 +50,7 @@ impl StopReason {
             StopReason::Stuck(_) => "stuck",
             StopReason::Steps => "steps",
             StopReason::Interrupted => "interrupted",
-            StopReason::Diverged(_) => "diverged",
+            StopReason::Diverged(_) => Self::DIVERGED,
         }
     }
 
@@ -278,9 +281,13 @@ fn cause_in_sweep(engine: &Engine) -> Option<String> {
     if let Some((factor, FeedbackReference::Initial)) =
         overshoot.filter(|(factor, _)| !(-2.0..=0.0).contains(factor))
     {
-        return Some(format!(
-            "feedback factor {factor}: the sweep grows once |1 + factor| times its spectral radius exceeds 1; bring the factor closer to 0"
-        ));
+        let is_framed = engine.roles()[engine.body().owned()].contains(&Role::Frame);
+        // Frame points copy displacements and take no feedback.
+        let limit = match engine.count_of_parts(usize::from(is_framed)) > 0 {
+            true => "makes the sweep grow (`flockform stability` finds the limit)",
+            false => "makes the sweep grow once |1 + factor| times its spectral radius exceeds 1",
+        };
+        return Some(format!("feedback factor {factor} {limit}; bring the factor closer to 0"));
     }
     if let Some((factor, FeedbackReference::Previous)) =
         overshoot.filter(|(factor, _)| !(-1.0..=0.0).contains(factor))

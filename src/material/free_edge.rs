@@ -48,6 +48,8 @@ pub struct Edge {
     pub particles: Vec<usize>,
     /// On all of the body under the whole load \[force / length^3\].
     pub body_force: [f64; 2],
+    /// Whether a force of its own acts on each particle, shape \[count\].
+    pub pushed: Vec<bool>,
     /// Loads that begin and end on sides, with less than [`FEWEST_LOADED`] spacings between.
     pub narrow: usize,
 }
@@ -134,6 +136,7 @@ impl FreeEdge {
             |(i, place): &(usize, Place)| held[*i] != [true; 2] && !is_inner_corner(outline, place);
         let on_outline = on_outline.filter(|(i, _)| exact.contains(i));
         edge.particles = on_outline.filter(is_recovered).map(|(i, _)| i).collect();
+        edge.pushed = is_pushed;
         Some(edge)
     }
 }

@@ -1,6 +1,7 @@
 //! A continuum run as messages: its particles as poses, markers and, for small bodies, members of a formation.
 //!
-//! A step is a twentieth of a second, so that players show twenty of them a second.
+//! A step is a twentieth of a second, so that players show twenty of them a second. Messages are in SI units, as their types
+//! say, where the scene's unit of length is known; the diagnostics name it.
 
 use super::RecordError;
 use crate::engine::Engine;
@@ -18,6 +19,7 @@ use crate::messages::recorder::{MessageRecorder, RecordSink};
 use crate::messages::std_msgs::{ColorRGBA, Header};
 use crate::messages::visualization_msgs::{Marker, MarkerArray};
 use crate::scene::Scene;
+use crate::scene::units::metres;
 
 /// \[s\]
 pub const STEP: f64 = 0.05;
@@ -36,6 +38,11 @@ pub struct BodyMessages {
     name: String,
     every: usize,
     solved: bool,
+    is_solved_at_once: bool,
+    /// The scene's.
+    unit: String,
+    /// In a unit of the scene \[m\]; one where it has no known length.
+    metres: f64,
     last: Option<usize>,
     poses: String,
     markers: String,
@@ -59,6 +66,9 @@ impl BodyMessages {
             recorder: sink.map(|sink| MessageRecorder::new(&names, "world", sink)).transpose()?,
             name: scene.name.clone(),
             solved: scene.equilibrium.is_some(),
+            is_solved_at_once: scene.is_solved_at_once(),
+            unit: scene.unit().to_owned(),
+            metres: metres(scene.unit()).unwrap_or(1.0),
             every,
             last: None,
             poses: names.topic("~/poses")?,
@@ -89,22 +99,50 @@ impl BodyMessages {
 
     fn take(&mut self, engine: &Engine, residual: f64) {
         self.last = Some(engine.step());
-        let time = engine.step() as f64 * STEP;
+        // Of one that was solved for at once there is no way there.
+        let step = if self.is_solved_at_once { 0 } else { engine.step() };
+        let time = step as f64 * STEP;
         let header = Header { stamp: Time::from_seconds(time), frame_id: "world".into() };
         let times = [time; 2];
         let present = engine.present();
         let seen = engine
             .of_all(|i| [present.x[i].to_bits(), present.y[i].to_bits(), engine.roles()[i].number().into()]);
-        let state = state(engine, &self.name, header.clone());
+        let metres = self.metres;
+        let state = state(engine, (&self.name, metres), step, header.clone());
+        let diagnostics = self.diagnostics(engine, header.clone(), residual);
         let Some(recorder) = &mut self.recorder else { return };
-        let place = |[x, y, _]: &[u64; 3]| [x, y].map(|&bits| f64::from_bits(bits));
+        let place = |[x, y, _]: &[u64; 3]| [x, y].map(|&bits| metres * f64::from_bits(bits));
         let poses = seen.iter().map(|one| Pose::planar(place(one), 0.0)).collect();
         recorder.take(&self.poses, &PoseArray { header: header.clone(), poses }, times);
         let role = |[.., number]: &[u64; 3]| Role::ALL[*number as usize];
         let of_all = seen.iter().map(|one| (place(one), role(one)));
-        recorder.take(&self.markers, &markers(engine, &header, of_all), times);
+        recorder.take(&self.markers, &markers(engine, metres, &header, of_all), times);
         recorder.take(&self.state, &state, times);
-        recorder.take(&self.diagnostics, &diagnostics(engine, &self.name, header, residual), times);
+        recorder.take(&self.diagnostics, &diagnostics, times);
+    }
+
+    fn diagnostics(&self, engine: &Engine, header: Header, residual: f64) -> DiagnosticArray {
+        let pair = |key: &str, value: String| KeyValue { key: key.into(), value };
+        let unit = match metres(&self.unit) {
+            Some(_) => "m".to_owned(),
+            None => format!("{}, as in the scene: no unit of known length", self.unit),
+        };
+        let mut values = vec![
+            pair("residual [1]", format!("{residual:e}")),
+            pair("broken bonds", engine.breaks().len().to_string()),
+            pair("unit of length", unit),
+        ];
+        if !self.is_solved_at_once {
+            values.insert(0, pair("step", engine.step().to_string()));
+        }
+        let status = DiagnosticStatus {
+            level: DiagnosticStatus::OK,
+            name: format!("/{NAME}: run"),
+            message: if self.solved { "solved for its rest" } else { "stepping" }.into(),
+            hardware_id: self.name.clone(),
+            values,
+        };
+        DiagnosticArray { header, status: vec![status] }
     }
 }
 
@@ -120,10 +158,11 @@ fn colour(role: Role) -> ColorRGBA {
 
 fn markers(
     engine: &Engine,
+    metres: f64,
     header: &Header,
     all: impl ExactSizeIterator<Item = ([f64; 2], Role)>,
 ) -> MarkerArray {
-    let spacing = engine.body().lattice.spacing();
+    let spacing = metres * engine.body().lattice.spacing();
     let size = 0.4 * spacing;
     let mut particles = Marker {
         header: header.clone(),
@@ -137,13 +176,15 @@ fn markers(
     let mut markers = vec![particles];
     let is_bonded = engine.parted().is_none() && engine.body().total() <= MOST_BONDED;
     if is_bonded && engine.flock().neighbours.index.len() <= MOST_BONDS {
-        markers.push(bonds(engine, header, 0.08 * spacing));
+        markers.push(bonds(engine, metres, header));
     }
     MarkerArray { markers }
 }
 
 /// Every bond that lives.
-fn bonds(engine: &Engine, header: &Header, width: f64) -> Marker {
+fn bonds(engine: &Engine, metres: f64, header: &Header) -> Marker {
+    let width = 0.08 * metres * engine.body().lattice.spacing();
+    let place = |i: usize| point(engine.present().get(i).map(|along| metres * along));
     let (present, reference) = (engine.present(), &engine.body().reference);
     let mut marker = Marker {
         header: header.clone(),
@@ -158,14 +199,14 @@ fn bonds(engine: &Engine, header: &Header, width: f64) -> Marker {
         for k in flock.live_neighbours(j).filter(once) {
             let rest = distance(reference.get(j), reference.get(k));
             let length = distance(present.get(j), present.get(k));
-            marker.points.extend([point(present.get(j)), point(present.get(k))]);
+            marker.points.extend([place(j), place(k)]);
             marker.colors.extend([of_strain(length / rest - 1.0); 2]);
         }
     }
     marker
 }
 
-fn state(engine: &Engine, name: &str, header: Header) -> FormationState {
+fn state(engine: &Engine, (name, metres): (&str, f64), step: usize, header: Header) -> FormationState {
     let (owned, is_whole) = (engine.body().owned(), engine.parted().is_none());
     let is_of_body = |&i: &usize| owned.contains(&i) && engine.roles()[i].is_body();
     let body: Vec<usize> = engine.body().rows().filter(is_of_body).collect();
@@ -175,29 +216,29 @@ fn state(engine: &Engine, name: &str, header: Header) -> FormationState {
     FormationState {
         header,
         formation: name.to_owned(),
-        tick: engine.step() as u64,
+        tick: step as u64,
         mode: FormationState::RUNNING,
         formation_error: f64::NAN,
         clearance: f64::INFINITY,
-        pe1_sum: engine.energies()[0],
+        pe1_sum: metres * metres * engine.energies()[0],
         strain_max: engine.largest_of_parts([own_strain])[0],
         elapsed: 0.0,
-        members: members.map(|(&i, strain)| member(engine, i, *strain)).collect(),
+        members: members.map(|(&i, strain)| member(engine, metres, i, *strain)).collect(),
     }
 }
 
-fn member(engine: &Engine, i: usize, strain: Option<Strain>) -> MemberState {
-    let [x, y] = engine.displacement(i);
+fn member(engine: &Engine, metres: f64, i: usize, strain: Option<Strain>) -> MemberState {
+    let [x, y] = engine.displacement(i).map(|along| metres * along);
     let nowhere = Point { x: f64::NAN, y: f64::NAN, z: f64::NAN };
     MemberState {
         name: engine.body().id(i).to_string(),
         role: if engine.roles()[i] == Role::Follower { MemberState::FOLLOWER } else { MemberState::LEADER },
         health: MemberState::FRESH,
-        position: point(engine.present().get(i)),
+        position: point(engine.present().get(i).map(|along| metres * along)),
         target: nowhere,
         settled: nowhere,
         displacement: Vector3 { x, y, z: 0.0 },
-        pe1: engine.pe1(i),
+        pe1: metres * metres * engine.pe1(i),
         strain: strain.map_or([f64::NAN; 3], |strain| strain.components),
         rotation: strain.map_or(f64::NAN, |strain| strain.rotation),
         age: 0.0,
@@ -205,21 +246,4 @@ fn member(engine: &Engine, i: usize, strain: Option<Strain>) -> MemberState {
         to_settled: f64::NAN,
         flags: 0,
     }
-}
-
-fn diagnostics(engine: &Engine, name: &str, header: Header, residual: f64) -> DiagnosticArray {
-    let pair = |key: &str, value: String| KeyValue { key: key.into(), value };
-    let values = vec![
-        pair("step", engine.step().to_string()),
-        pair("residual [1]", format!("{residual:e}")),
-        pair("broken bonds", engine.breaks().len().to_string()),
-    ];
-    let status = DiagnosticStatus {
-        level: DiagnosticStatus::OK,
-        name: format!("/{NAME}: run"),
-        message: "stepping".into(),
-        hardware_id: name.to_owned(),
-        values,
-    };
-    DiagnosticArray { header, status: vec![status] }
 }

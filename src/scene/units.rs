@@ -33,6 +33,26 @@ const FORCES: [(&str, &str, &str); 14] = [
     ("ksi", "in", "kip"),
 ];
 
+/// Names of units of length, and the metres in one.
+const LENGTHS: [(&str, f64); 11] = [
+    ("m", 1.0),
+    ("km", 1e3),
+    ("dm", 1e-1),
+    ("cm", 1e-2),
+    ("mm", 1e-3),
+    ("µm", 1e-6),
+    ("μm", 1e-6),
+    ("um", 1e-6),
+    ("nm", 1e-9),
+    ("in", 0.0254),
+    ("ft", 0.3048),
+];
+
+/// Metres in a unit of length of this name; `None` of one that has none, as "unit".
+pub fn metres(unit: &str) -> Option<f64> {
+    LENGTHS.iter().find(|(name, _)| *name == unit).map(|(_, metres)| *metres)
+}
+
 impl Units {
     /// Of the numbers in a scene and in its results.
     pub fn of(scene: &Scene) -> Self {

@@ -92,6 +92,7 @@ fn a_sweep_that_grows_is_warned_of_before_it_diverges_and_one_that_rests_is_not(
     let grown = ["rule.feedback={ factor = 0.2 }", "stop.steps=45", "frame=\"none\"", "record.probes=[]"];
     let said = said_by_run("tension", &grown);
     assert!(said.contains("the sweep grows from step to step: feedback factor 0.2"), "{said}");
+    assert!(said.contains("once |1 + factor| times its spectral radius exceeds 1"), "{said}");
     let at_rest = [
         "rule.feedback={ factor = 0.002, reference = \"previous\" }",
         "stop={ steps = 20000, tolerance = 1e-9 }",

@@ -113,6 +113,8 @@ fn a_run_that_diverges_fails_names_the_cause_and_keeps_the_last_good_state() {
     let said = failed(&arguments, folder.path());
     assert!(said.contains("diverged at step") && said.contains("particle"), "{said}");
     assert!(said.contains("feedback factor 1"), "{said}");
+    // Its frame takes no feedback.
+    assert!(said.contains("`flockform stability`") && !said.contains("spectral radius"), "{said}");
     let summary = json_in(&folder.path().join("o/summary.json"));
     assert_eq!(summary["stop_reason"], "diverged");
     let table = std::fs::read_to_string(folder.path().join("o/final.csv")).expect("written");

@@ -39,6 +39,39 @@ fn a_bar_pulled_by_forces_on_its_particles_has_the_same_stress_everywhere() {
     }
 }
 
+/// Stress jumps across a line of forces, and no field is to be fitted across it.
+#[test]
+fn beside_lines_of_forces_the_edges_have_the_stress_of_their_own_part() {
+    let line = |x: f64, [low, high]: [f64; 2], pull: f64| {
+        let (left, right) = (x - 0.1, x + 0.1);
+        format!(
+            "{{ kind = \"force\", region = {{ kind = \"box\", min = [{left}, {low}], max = [{right}, {high}] }}, force = [{pull}, 0.0] }}"
+        )
+    };
+    let lines = [10.0, 20.0]
+        .map(|x| [line(x, [-0.1, 0.1], 0.5), line(x, [0.9, 5.1], 1.0), line(x, [5.9, 6.1], 0.5)].join(", "));
+    let traction =
+        "{ kind = \"traction\", region = { kind = \"edge\", side = \"right\" }, traction = [1.0, 0.0] }";
+    let parts = format!(
+        "material = {{ kind = \"isotropic\", young = 1000.0, poisson = 0.0 }}\n\
+         body = {{ shape = {{ kind = \"rectangle\", max = [30.0, 6.0] }} }}\n{CLAMP}\nloads = [{traction}, {}]",
+        lines.join(", ")
+    );
+    let scene = scene(&lattice("square", 1.0, 0.0), &parts).unwrap_or_else(|error| panic!("{error}"));
+    let (plan, outcome) = solved(&scene);
+    let stresses = Stresses::at_present(&outcome.engine).expect("has cells");
+    for (i, stress) in stresses.particles.iter().enumerate() {
+        let [xx, yy, xy] = stress.as_ref().expect("in a cell").components;
+        let [x, y] = plan.setup.body.reference.get(i);
+        // On a line it is that between both sides.
+        let expected =
+            [10.0, 20.0].iter().map(|line| (line - x).signum() * f64::from(u8::from(line - x != 0.0)));
+        let expected = 2.0 + 0.5 * expected.sum::<f64>();
+        let apart = (xx - expected).abs().max(yy.abs()).max(xy.abs());
+        assert!(apart < 1e-6, "({x}, {y}): {xx} {yy} {xy} and not {expected}");
+    }
+}
+
 /// A stepped bar under a traction of 1.
 fn stepped(actions: &str, poisson: f64) -> Scene {
     let text = format!(

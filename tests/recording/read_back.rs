@@ -79,6 +79,71 @@ fn a_flight_s_recording_has_the_topics_of_the_live_node() {
     assert!(!folder.path().join("f.mcap.part").exists());
 }
 
+/// The last message of each kind in the recording of a bundled scene.
+fn last_of_body(scene: &str, sets: &[&str]) -> (PoseArray, FormationState, MarkerArray, DiagnosticArray) {
+    let folder = temporary();
+    let sets = sets.iter().flat_map(|set| ["--set", *set]);
+    let run = ["run", scene, "-q", "--figures", "none", "--no-report", "--out", "o", "--record", "b.mcap"];
+    says(0, &run.into_iter().chain(sets).collect::<Vec<_>>(), folder.path());
+    let (mut poses, mut state, mut markers, mut diagnostics) = (None, None, None, None);
+    let reader = Reader::open(&folder.path().join("b.mcap")).expect("readable");
+    let damage = reader.each(&mut |entry| {
+        poses = entry.decode().or(poses.take());
+        state = entry.decode().or(state.take());
+        markers = entry.decode().or(markers.take());
+        diagnostics = entry.decode().or(diagnostics.take());
+    });
+    assert_eq!(damage, None);
+    (
+        poses.expect("poses"),
+        state.expect("a state"),
+        markers.expect("markers"),
+        diagnostics.expect("diagnostics"),
+    )
+}
+
+#[test]
+fn bodies_are_recorded_in_metres_where_their_unit_has_any_and_say_so_where_it_has_none() {
+    let of = |unit: &str| last_of_body("tension", &["stop.steps=20", unit]);
+    let unit_said = |all: &DiagnosticArray| {
+        let of_unit = all.status[0].values.iter().find(|pair| pair.key == "unit of length");
+        of_unit.expect("there").value.clone()
+    };
+    let (poses, state, markers, said) = of("unit=\"m\"");
+    assert_eq!((unit_said(&said).as_str(), said.status[0].message.as_str()), ("m", "stepping"));
+    let near = |small: f64, large: f64, by: f64| (small - by * large).abs() <= 1e-12 * (by * large).abs();
+    let (in_mm, state_in_mm, markers_in_mm, said) = of("unit=\"mm\"");
+    assert_eq!(unit_said(&said), "m");
+    assert!(poses.poses.iter().any(|pose| pose.position.x > 5.0) && state.pe1_sum > 1e-3);
+    for (small, large) in in_mm.poses.iter().zip(&poses.poses) {
+        assert!(near(small.position.x, large.position.x, 1e-3), "{small:?} {large:?}");
+        assert!(near(small.position.y, large.position.y, 1e-3), "{small:?} {large:?}");
+    }
+    assert!(near(state_in_mm.pe1_sum, state.pe1_sum, 1e-6) && state_in_mm.strain_max == state.strain_max);
+    for (small, large) in state_in_mm.members.iter().zip(&state.members) {
+        assert!(near(small.pe1, large.pe1, 1e-6) && small.strain == large.strain, "{small:?} {large:?}");
+        assert!(near(small.displacement.x, large.displacement.x, 1e-3), "{small:?} {large:?}");
+        assert!(near(small.position.x, large.position.x, 1e-3), "{small:?} {large:?}");
+    }
+    for (small, large) in markers_in_mm.markers.iter().zip(&markers.markers) {
+        assert!(near(small.scale.x, large.scale.x, 1e-3), "{} {}", small.scale.x, large.scale.x);
+        for (small, large) in small.points.iter().zip(&large.points) {
+            assert!(near(small.x, large.x, 1e-3), "{small:?} {large:?}");
+        }
+    }
+    let (poses_of_none, .., said) = of("unit=\"span\"");
+    assert_eq!(poses_of_none.poses, poses.poses);
+    assert!(unit_said(&said).starts_with("span, as in the scene"), "{}", unit_said(&said));
+}
+
+#[test]
+fn a_body_that_is_solved_for_at_once_is_recorded_without_steps() {
+    let (poses, state, _, said) = last_of_body("beam-loaded", &[]);
+    let said = &said.status[0];
+    assert_eq!((said.message.as_str(), state.tick, poses.header.stamp.sec), ("solved for its rest", 0, 0));
+    assert!(said.values.iter().all(|pair| pair.key != "step"), "{:?}", said.values);
+}
+
 #[test]
 fn a_killed_program_s_recording_lacks_its_last_second_at_most() {
     let folder = temporary();

@@ -270,9 +270,17 @@ fn a_rule_is_not_blamed_for_a_leader_that_leaves_the_body_behind() {
 /// A run that a leader has torn apart says it of any rule; here each rule is asked for itself.
 #[test]
 fn a_sweep_is_said_to_grow_by_those_terms_alone_that_make_one_grow() {
+    let cause = |sets: &[&str]| {
+        let sets = [&["stop.steps=1"], sets].concat();
+        let outcome = run(plan(&scene("tension", &sets)), &mut |_, _| ControlFlow::Continue(()));
+        cause_in_sweep(&outcome.engine)
+    };
+    let unframed = cause(&["rule.feedback={factor=0.5}", "frame=none", "record.probes=[]"]);
+    assert!(unframed.as_ref().is_some_and(|cause| cause.contains("spectral radius")), "{unframed:?}");
     for (rule, word) in [
         ("rule.feedback={factor=-0.05}", None),
-        ("rule.feedback={factor=0.5}", Some("spectral radius")),
+        // A frame takes no feedback.
+        ("rule.feedback={factor=0.5}", Some("flockform stability")),
         ("rule.feedback={factor=-0.1,reference=\"previous\"}", None),
         ("rule.feedback={factor=0.5,reference=\"previous\"}", Some("between -1 and 0")),
         ("rule.feedback={factor=-1.5,reference=\"previous\"}", Some("between -1 and 0")),
@@ -283,9 +291,7 @@ fn a_sweep_is_said_to_grow_by_those_terms_alone_that_make_one_grow() {
         ("rule.weights={kind=\"list\",values=[1,2,1,2]}", None),
         ("rule.weights={kind=\"list\",values=[1,-0.5,1,1]}", Some("both signs")),
     ] {
-        let outcome =
-            run(plan(&scene("tension", &["stop.steps=1", rule])), &mut |_, _| ControlFlow::Continue(()));
-        let cause = cause_in_sweep(&outcome.engine);
+        let cause = cause(&[rule]);
         let is_as_expected = match (&cause, word) {
             (Some(cause), Some(word)) => cause.contains(word),
             (cause, word) => cause.is_some() == word.is_some(),

@@ -42,14 +42,20 @@ impl Bands {
         (self.levels.values.len() - 1).max(1)
     }
 
-    /// Lowest value of a band.
+    /// Lowest value of a band: by so little below its level that what rounding leaves there is in one band.
     pub fn level(&self, band: usize) -> f64 {
-        self.levels.values[band]
+        /// Part of a band's width.
+        const ROUNDING: f64 = 1e-6;
+        let width = match self.levels.values[..] {
+            [first, second, ..] => second - first,
+            _ => 0.0,
+        };
+        self.levels.values[band] - ROUNDING * width
     }
 
     /// The band that a value falls into.
     pub fn of(&self, value: f64) -> usize {
-        self.levels.values.partition_point(|&level| level <= value).clamp(1, self.count()) - 1
+        (1..self.count()).take_while(|&band| self.level(band) <= value).count()
     }
 
     pub fn colour(&self, band: usize) -> String {
@@ -188,6 +194,17 @@ mod tests {
         let bands = Bands::around(0.0, 1.0, 0.0);
         assert_eq!((bands.count(), bands.of(0.0), bands.of(0.25), bands.of(1.0)), (10, 0, 2, 9));
         assert_eq!([bands.colour(0), bands.colour(9)], ["#440154", "#fde725"]);
+    }
+
+    #[test]
+    fn what_rounding_leaves_at_a_level_is_in_the_band_above_it() {
+        let bands = Bands::around(0.0, 1.0, 0.0);
+        let [low, high] = [-1.0, 1.0].map(|sign| 0.5 + sign * 1e-9);
+        assert_eq!(([low, 0.5, high].map(|value| bands.of(value)), bands.of(0.5 - 1e-5)), ([5; 3], 4));
+        assert!(low >= bands.level(5) && bands.level(0) < 0.0);
+        // Of reactions of either sign, which are none.
+        let bands = Bands::around(-550.0, 550.0, 0.0);
+        assert_eq!(bands.of(-1.1e-13), bands.of(1.2e-13));
     }
 
     #[test]

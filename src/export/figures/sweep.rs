@@ -17,6 +17,8 @@ const HEIGHT: f64 = 430.0;
 const TEXT: f64 = 12.0;
 /// Runs without a value \[colour\].
 const ABSENT: &str = "#d9dce0";
+/// How they are shown where there are no cells for them.
+const LEFT_OUT: &str = "left out";
 
 /// A varied key or an output, with its value in each run.
 #[derive(Clone, Debug)]
@@ -92,6 +94,8 @@ pub struct Swept<'a> {
     pub keys: Vec<Column>,
     /// Those to show; the first alone over two keys and more.
     pub outputs: Vec<Column>,
+    /// The number of runs that diverged, which have no values.
+    pub diverged: usize,
 }
 
 impl Swept<'_> {
@@ -99,9 +103,14 @@ impl Swept<'_> {
         self.keys.first().map_or(0, |key| key.values.len())
     }
 
-    fn heading(&self, output: &Column) -> Heading {
-        let words: Vec<String> = self.keys.iter().filter_map(Column::words).collect();
-        let note = [vec![format!("{}, {} runs", output.name, self.runs())], words].concat().join("; ");
+    /// `absent` says how runs without a value are shown.
+    fn heading(&self, output: &Column, absent: &str) -> Heading {
+        let runs = self.runs();
+        let diverged = (self.diverged > 0).then(|| format!("{} of {runs} diverged: {absent}", self.diverged));
+        let words = self.keys.iter().filter_map(Column::words);
+        let note: Vec<String> =
+            [format!("{}, {runs} runs", output.name)].into_iter().chain(diverged).chain(words).collect();
+        let note = note.join("; ");
         Heading { title: self.title.to_owned(), note, ..Heading::default() }
     }
 }
@@ -124,7 +133,7 @@ fn lines(swept: &Swept<'_>, key: &Column) -> String {
         let points = pairs.filter_map(|(&x, &y)| Some([x?, y.unwrap_or(f64::NAN)]));
         let mut points: Vec<[f64; 2]> = points.collect();
         points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        let heading = swept.heading(output);
+        let heading = swept.heading(output, LEFT_OUT);
         let series = |style| Series::new("", SERIES[n], style, points.clone());
         // The line shows how it goes, the dots where it is known.
         let series =
@@ -138,7 +147,7 @@ fn lines(swept: &Swept<'_>, key: &Column) -> String {
 
 /// The output as colour over two keys: cells of a grid, or dots where the runs were drawn.
 fn heat_map(swept: &Swept<'_>, keys: [&Column; 2], output: &Column) -> String {
-    let heading = swept.heading(output);
+    let heading = swept.heading(output, "grey");
     let [low, high] = output.ends();
     let bands = Bands::around(low, high, 0.0);
     let edges = keys.map(|key| if swept.is_grid { cell_edges(key) } else { around(key) });
@@ -209,7 +218,7 @@ fn around(key: &Column) -> Vec<f64> {
 
 /// An upright axis for each key and for the output, and each run as a line through its values.
 fn parallel(swept: &Swept<'_>, output: &Column) -> String {
-    let mut heading = swept.heading(output);
+    let mut heading = swept.heading(output, LEFT_OUT);
     heading.note += "; dark lines are low, bright lines high";
     let top = heading.height(page::WIDTH) + 12.0;
     let mut svg = Svg::new(page::WIDTH, top + HEIGHT + Axes::BELOW);
@@ -275,7 +284,7 @@ mod tests {
     }
 
     fn swept(keys: Vec<Column>, output: &[f64]) -> Swept<'static> {
-        Swept { title: "T", is_grid: true, keys, outputs: vec![column("pe1", output)] }
+        Swept { title: "T", is_grid: true, keys, outputs: vec![column("pe1", output)], diverged: 0 }
     }
 
     #[test]

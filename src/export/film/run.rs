@@ -1,6 +1,7 @@
 //! The film of a run: its configurations, coloured by a quantity.
 
 use std::collections::{HashMap, HashSet};
+use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
@@ -12,13 +13,12 @@ use crate::engine::Engine;
 use crate::export::figures::configuration::{Setting, configuration_in};
 use crate::export::figures::{Subject, displaced, page};
 use crate::export::largest_strain;
-use crate::export::report::recorder::{PE1, PE2, STRAIN, VON_MISES, is_linear};
+use crate::export::report::recorder::{PE1, PE2, STRAIN, VON_MISES, is_linear, von_mises};
 use crate::export::report::{RunRecorder, Sample};
 use crate::flock::body::Body;
 use crate::flock::pseudo_energy::pe1_among;
 use crate::flock::strain::strain_among;
 use crate::flock::vectors::Vectors;
-use crate::material::stress::StressState;
 use crate::scene::Scene;
 use crate::scene::units::Units;
 
@@ -82,6 +82,8 @@ struct Shown<'a> {
     sample: Option<(Body, HashMap<u32, u32>)>,
     /// Of the body at the end, where strains are computed from the frames \[1\].
     largest_strain: Option<f64>,
+    /// The stress at the end, which the frames of a body that was solved for at once have parts of.
+    final_stress: OnceLock<Vec<f64>>,
 }
 
 impl<'a> Shown<'a> {
@@ -92,14 +94,16 @@ impl<'a> Shown<'a> {
             FilmColour::Pe1 => Some(PE1),
             _ => None,
         };
-        let is_computed = quantity.is_some_and(|quantity| !recorder.keeps(quantity));
+        let is_part_of_end = colour == FilmColour::VonMises && recorder.is_solved();
+        let is_computed = quantity.is_some_and(|quantity| !recorder.keeps(quantity)) && !is_part_of_end;
         let largest_strain = is_computed.then(|| largest_strain(engine)).flatten();
         let of_sample = |sample: &Sample| {
             let places = sample.ids.iter().copied().zip(0..).collect();
             (sample.body(engine.body().lattice.spacing()), places)
         };
         let sample = recorder.sample().map(of_sample);
-        Self { scene, engine, recorder, colour, sample, largest_strain }
+        let final_stress = OnceLock::new();
+        Self { scene, engine, recorder, colour, sample, largest_strain, final_stress }
     }
 
     /// Of a body in parts its sample, without bonds, cells and roles of single components.
@@ -224,15 +228,15 @@ impl<'a> Shown<'a> {
     }
 
     fn stress(&self, frame: usize) -> Vec<f64> {
-        let displacement = self.displacement(frame);
         let step = self.recorder.frames()[frame].step;
+        // Frames of a body that is not linear keep theirs.
+        if let Some(part) = self.recorder.part_of_load(step) {
+            let whole = self.final_stress.get_or_init(|| von_mises(Stresses::at_present(self.engine)));
+            return whole.iter().map(|stress| part * stress).collect();
+        }
+        let displacement = self.displacement(frame);
         let found = Stresses::of(self.engine, step, &displacement, &self.broken(frame));
-        let none = || vec![f64::NAN; displacement.len()];
-        let size = |found: Stresses| {
-            let of = |one: &Option<StressState>| one.map_or(f64::NAN, |stress| stress.von_mises);
-            found.particles.iter().map(of).collect()
-        };
-        found.map_or_else(none, size)
+        found.map_or_else(|| vec![f64::NAN; displacement.len()], |found| von_mises(Some(found)))
     }
 
     fn scale(&self, setting: &Setting) -> Option<Scale<'static>> {
@@ -258,6 +262,79 @@ mod tests {
     use crate::continuum::plan::Plan;
     use crate::engine::observer::EachStep;
 
+    /// The outcome, its recorder, and what each step had.
+    fn ran<T>(scene: &Scene, films: bool, see: impl Fn(&Engine) -> T) -> (Outcome, RunRecorder, Vec<T>) {
+        let plan = Plan::new(scene).unwrap_or_else(|error| panic!("{error}"));
+        let (mut recorder, mut seen) = (None, Vec::new());
+        let mut watch = |engine: &Engine, _: f64| {
+            RunRecorder::open(&mut recorder, &mut None, (scene, engine, films)).watch(engine);
+            seen.push(see(engine));
+            ControlFlow::Continue(())
+        };
+        let outcome = run_to_equilibrium_watched(scene, plan, &mut EachStep(&mut watch)).expect("an end");
+        let mut recorder = recorder.expect("it has looked");
+        recorder.close(scene, &outcome);
+        (outcome, recorder, seen)
+    }
+
+    fn scene(text: &str) -> Scene {
+        Scene::parse("body", "body", text, &[], None).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// A bar of 20 x 5 that is pulled from its right side.
+    const BAR: &str = r#"
+        title = "A bar, pulled"
+        lattice = { kind = "square", spacing = 1.0 }
+        material = { kind = "isotropic", young = 1000.0, poisson = 0.0 }
+        rule = { mean = { kind = "material" } }
+        roles = [{ region = { kind = "edge", side = "left" }, role = "clamped" }]
+        loads = [{ kind = "traction", region = { kind = "edge", side = "right" }, traction = [10.0, 0.0] }]
+        "#;
+
+    #[test]
+    fn half_way_to_a_body_solved_at_once_its_edges_bear_half_the_load() {
+        let solved = "body = { shape = { kind = \"rectangle\", max = [20.0, 5.0] } }\n[equilibrium]";
+        let scene = scene(&format!("{BAR}{solved}"));
+        let (outcome, recorder, _) = ran(&scene, true, |_| ());
+        let shown = Shown::new(&scene, &outcome.engine, &recorder, FilmColour::VonMises);
+        for (frame, expected) in [(0, 0.0), (10, 5.0), (20, 10.0)] {
+            let values = shown.values(frame).expect("shown");
+            let worst = values.iter().map(|value| (value - expected).abs()).fold(0.0, f64::max);
+            assert!(worst < 1e-6, "frame {frame}: off by {worst}");
+            assert!(shown.uncertain(frame).is_none(), "it is a part of what is exact");
+        }
+    }
+
+    #[test]
+    fn a_film_of_steps_has_stress_recovered_around_an_inclusion_too_and_a_report_says_where_it_is_not() {
+        let stepped = r#"
+            stop.steps = 20
+            [body]
+            shape = { kind = "rectangle", max = [20.0, 5.0] }
+            holes = [{ kind = "disc", centre = [14.0, 2.5], radius = 1.5 }]
+            inclusions = [
+                { shape = { kind = "disc", centre = [6.0, 2.5], radius = 1.2 }, material = { kind = "isotropic", young = 1000.0, poisson = 0.0 } },
+            ]"#;
+        let scene = scene(&format!("{BAR}{stepped}"));
+        let see = |engine: &Engine| {
+            let recovered = von_mises(Stresses::at_present(engine));
+            (engine.step(), recovered, Stresses::von_mises_of_cells(engine))
+        };
+        for films in [true, false] {
+            let (outcome, mut recorder, seen) = ran(&scene, films, see);
+            let shown = Shown::new(&scene, &outcome.engine, &recorder, FilmColour::VonMises);
+            let frame = recorder.frames().len() - 2;
+            let values = shown.values(frame).expect("shown");
+            let step = recorder.frames()[frame].step;
+            let (_, recovered, of_cells) = seen.iter().find(|one| one.0 == step).expect("it was seen");
+            let off =
+                |other: &[f64]| values.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let (right, wrong) = if films { (recovered, of_cells) } else { (of_cells, recovered) };
+            assert!(off(right) < 1e-5 && off(wrong) > 0.1, "{films}: {} {}", off(right), off(wrong));
+            assert_eq!(recorder.stage(&scene, &outcome).has_mean_stress, !films);
+        }
+    }
+
     /// Stretched by 1e-4 and turned by 90 degrees: strain and stress are the same everywhere.
     #[test]
     fn a_film_of_a_body_that_turns_far_ends_with_its_strain_and_says_how_sure_it_was_on_the_way() {
@@ -273,16 +350,8 @@ mod tests {
             role = "leader"
             motion = { kind = "affine", rotate = 90.0, stretch = [1.0001, 1.0], steps = 2 }
             "#;
-        let scene = Scene::parse("steel", "steel", text, &[], None).unwrap_or_else(|error| panic!("{error}"));
-        let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
-        let mut recorder = None;
-        let mut see = |engine: &Engine, _: f64| {
-            RunRecorder::open(&mut recorder, &mut None, (&scene, engine, false)).watch(engine);
-            ControlFlow::Continue(())
-        };
-        let outcome = run_to_equilibrium_watched(&scene, plan, &mut EachStep(&mut see)).expect("an end");
-        let mut recorder = recorder.expect("it has looked");
-        recorder.close(&scene, &outcome);
+        let scene = scene(text);
+        let (outcome, recorder, _) = ran(&scene, false, |_| ());
         for (colour, expected) in [(FilmColour::Strain, 1e-4), (FilmColour::VonMises, 21.0)] {
             let shown = Shown::new(&scene, &outcome.engine, &recorder, colour);
             let worst = |frame: usize| {

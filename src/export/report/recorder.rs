@@ -147,8 +147,9 @@ impl RunRecorder {
         let roles = roles(engine, sample.as_ref()).into_owned();
         let frames = Frames::new(count, channels);
         let first_roles = roles.clone();
-        // A film shows it as the last frame has it.
-        let is_recovered = scene.equilibrium.is_some() || (films && sample.is_some());
+        // A film shows it as the last frame has it: from frames that keep it, or by itself.
+        let is_film_of_kept = films && (sample.is_some() || stress(scene).is_none());
+        let is_recovered = scene.equilibrium.is_some() || is_film_of_kept;
         let (changes, is_solved) = (Vec::new(), false);
         Self { frames, first_roles, roles, changes, is_solved, is_recovered, sample }
     }
@@ -182,7 +183,7 @@ impl RunRecorder {
         if self.frames.wants(engine.step()) {
             let is_recovered = self.is_recovered;
             let stress = || match is_recovered {
-                true => von_mises(engine, 1.0),
+                true => von_mises(Stresses::at_present(engine)),
                 false => Stresses::von_mises_of_cells(engine),
             };
             let seen = Seen::now(engine, self.sample.as_ref(), &stress);
@@ -215,6 +216,7 @@ impl RunRecorder {
 
     /// The frame of the end, which is exact whatever its step; of a body that was solved for at once, the way there.
     fn finish(&mut self, scene: &Scene, engine: &Engine, is_solved: bool) {
+        let at_end = || von_mises(Stresses::at_present(engine));
         if is_solved {
             let mut channels = self.frames.channels.clone();
             // Of an even load the page has as many parts of what it knows exactly.
@@ -234,8 +236,8 @@ impl RunRecorder {
                 let under = displacements.as_ref().map(|u| displaced(&engine.body().reference, u, part));
                 let places = under.as_ref().unwrap_or(engine.present());
                 let stress = || match is_linear(scene) {
-                    false => von_mises(engine, part),
-                    true => whole.get_or_init(|| von_mises(engine, 1.0)).iter().map(|v| part * v).collect(),
+                    false => von_mises(Stresses::under_part(engine, part)),
+                    true => whole.get_or_init(at_end).iter().map(|v| part * v).collect(),
                 };
                 let seen = Seen { engine, sample: of_sample, part, places, stress: &stress };
                 let values = |_: usize, channel: &Channel| seen.values(channel).into();
@@ -245,8 +247,7 @@ impl RunRecorder {
                 }
             }
         } else {
-            let stress = || von_mises(engine, 1.0);
-            let seen = Seen::now(engine, self.sample.as_ref(), &stress);
+            let seen = Seen::now(engine, self.sample.as_ref(), &at_end);
             self.frames.keep_last(engine.step(), |_, channel| seen.values(channel).into());
         }
         self.take_roles(engine);
@@ -340,6 +341,8 @@ impl RunRecorder {
         } else if stress.is_none() {
             quantities.retain(|quantity| quantity.key != VON_MISES);
         }
+        let is_mean_of_frames = self.keeps(VON_MISES) && !self.is_recovered && !is_solved;
+        stage.has_mean_stress = stage.animation.stress.is_some() || is_mean_of_frames;
         stage.set_roles(&self.first_roles, &self.changes);
         if let Some(sample) = &self.sample {
             stage.set_reference(&sample.reference);
@@ -425,12 +428,11 @@ fn roles<'a>(engine: &'a Engine, sample: Option<&Sample>) -> Cow<'a, [Role]> {
     sample.map_or(Cow::Borrowed(engine.roles()), |sample| Cow::Owned(of_sample(sample)))
 }
 
-/// The von Mises stress around each particle \[force / length^2\] under a part of displacements and loads, shape \[count\]; NaN where
-/// there is none.
-fn von_mises(engine: &Engine, part: f64) -> Vec<f64> {
-    let particles = Stresses::under_part(engine, part).map(|stresses| stresses.particles);
+/// The von Mises stress around each particle \[force / length^2\], shape \[count\]; NaN where there is none, empty without a
+/// material.
+pub(in crate::export) fn von_mises(stresses: Option<Stresses>) -> Vec<f64> {
     let of = |stress: Option<StressState>| stress.map_or(f64::NAN, |stress| stress.von_mises);
-    particles.map_or_else(Vec::new, |particles| particles.into_iter().map(of).collect())
+    stresses.map_or_else(Vec::new, |stresses| stresses.particles.into_iter().map(of).collect())
 }
 
 /// Whether the equilibrium was found without intermediate states.

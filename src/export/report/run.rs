@@ -35,7 +35,7 @@ pub fn write(
         title: scene.raw.title.clone(),
         command: format!("flockform run {}", scene.name),
         verdict: Some(verdict(outcome, summary)),
-        note: note(&stage.animation, outcome, is_solved_at_once(scene, outcome)),
+        note: note(&stage, outcome, is_solved_at_once(scene, outcome)),
         stages: vec![stage],
         plots,
         facts: facts(scene, outcome, summary),
@@ -60,7 +60,8 @@ fn verdict(outcome: &Outcome, summary: &Summary) -> (bool, String) {
 }
 
 /// A sentence on the frames that are shown and those that are not.
-fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
+fn note(stage: &View, outcome: &Outcome, is_solved: bool) -> String {
+    let animation = &stage.animation;
     let frames = animation.times.len();
     let bits = animation.channels.first().map_or(0, |channel| channel.bits);
     let body = outcome.engine.body();
@@ -88,13 +89,10 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
     if let Some(first) = animation.times.first().filter(|&&first| first > 0.0 && !is_solved) {
         note += &format!(" This run was resumed at step {first}; earlier steps are not shown.");
     }
-    // The page computes it of steps, or frames keep it as the page would.
-    let is_mean =
-        animation.stress.is_some() || (is_sample && !is_solved && animation.clock.quantity == "step");
-    let before_the_last = match is_mean && outcome.engine.free_edge().is_some() {
+    let before_the_last = match stage.has_mean_stress && outcome.engine.free_edge().is_some() {
         true => {
-            " Stress before the last frame is the mean of each particle's cells, unless ranks film the body in parts; at the last it is \
-             recovered along the outline too, as in final.csv and films."
+            " Stress before the last frame is the mean of each particle's cells; at the last it is recovered along the outline too, \
+             as in final.csv and films."
         }
         false => "",
     };

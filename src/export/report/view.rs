@@ -98,12 +98,15 @@ pub(crate) struct Outline {
 pub struct View {
     pub(crate) animation: Animation,
     pub(crate) arrays: Vec<(String, String)>,
+    /// Whether stress before the last frame is the mean of each particle's cells along the outline too.
+    pub(crate) has_mean_stress: bool,
 }
 
 impl View {
     pub(crate) fn new(animation: Animation) -> Self {
         let role_names = Role::ALL.map(Role::name).to_vec();
-        Self { animation: Animation { group: GROUP, role_names, ..animation }, arrays: Vec::new() }
+        let animation = Animation { group: GROUP, role_names, ..animation };
+        Self { animation, arrays: Vec::new(), has_mean_stress: false }
     }
 
     /// The frames, and the clock's value at each of them.

@@ -20,6 +20,7 @@ use super::csv::write_below;
 use super::error::ExportError;
 use super::figures::sweep::{Column, Swept, draw};
 use super::figures::{self, Formats};
+use crate::continuum::run::StopReason;
 use crate::study::design::{Design, Level};
 
 /// The runs of a sweep.
@@ -88,21 +89,32 @@ impl Table<'_> {
             keys: (0..self.design.factors.len()).map(key).collect(),
             // Outputs that are the same everywhere are shown where there are no others.
             outputs: if asked.is_empty() && plotted.is_none() { all } else { asked },
+            diverged: self.diverged(),
         })
     }
 
-    /// The numbers of an output.
+    /// How many runs diverged.
+    pub fn diverged(&self) -> usize {
+        self.rows.values().filter(|row| has_diverged(row)).count()
+    }
+
+    /// The numbers of an output; of a run that diverged there is none, whatever it was last.
     fn column(&self, n: usize) -> Column {
-        let value = |row: &Row| row.outputs.get(n).and_then(|text| text.parse::<f64>().ok());
+        let text = |row: &Row| row.outputs.get(n).filter(|_| !has_diverged(row)).cloned();
+        let value = |row: &Row| text(row).and_then(|text| text.parse::<f64>().ok());
         let values = self.rows.values().map(value).collect();
         Column { name: self.outputs[n].clone(), is_log: false, values, categories: Vec::new() }
     }
 
-    /// Whether any run has a number for this output.
+    /// Whether any run that did not diverge has a number for this output.
     pub fn has_numbers(&self, output: &str) -> bool {
         let at = self.outputs.iter().position(|name| name == output);
         at.is_some_and(|n| self.column(n).has_numbers())
     }
+}
+
+fn has_diverged(row: &Row) -> bool {
+    row.stop_reason == StopReason::DIVERGED
 }
 
 /// A cell as JSON: a number where it is one, an integer to its last digit.
@@ -132,6 +144,29 @@ pub fn write_sweep(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_diverged_is_in_the_table_and_counted_in_the_figure_but_has_no_colour() {
+        let vary = ["a=0:1:2", "b=0:1:2"].map(|text| text.parse().expect("a factor"));
+        let design = Design::grid(vary.to_vec()).expect("a grid");
+        let outputs = ["strain".to_owned()];
+        let row = |(run, (value, stop_reason)): (usize, (&str, &str))| {
+            let [outputs, cautions] = [vec![value.to_owned()], Vec::new()];
+            (run, Row { run, stop_reason: stop_reason.into(), outputs, reason: String::new(), cautions })
+        };
+        let ends = [("1.0", "steps"), ("2.0", "steps"), ("3.0", "equilibrium"), ("2600.0", "diverged")];
+        let rows = ends.into_iter().enumerate().map(row).collect();
+        let table = Table { title: "T", design: &design, is_grid: true, outputs: &outputs, rows: &rows };
+        let figure = table.figure(None).expect("drawn");
+        assert!(figure.contains("1 of 4 diverged: grey") && !figure.contains("2600"), "{figure}");
+        assert_eq!(table.cells().last().expect("a row")[3], "2600.0");
+        let [one, _] = vary;
+        let design = Design::grid(vec![one]).expect("a grid");
+        let rows = ends.into_iter().skip(2).enumerate().map(row).collect();
+        let table = Table { design: &design, rows: &rows, ..table };
+        let figure = table.figure(Some("strain")).expect("drawn");
+        assert!(figure.contains("1 of 2 diverged: left out") && !figure.contains("2600"), "{figure}");
+    }
 
     #[test]
     fn cells_keep_their_numbers_in_json() {

@@ -230,12 +230,19 @@ fn whole_between([from, to]: [f64; 2], part: f64, is_log: bool) -> f64 {
     between(ends, part, is_log).floor().clamp(from.min(to), from.max(to))
 }
 
-/// The `n`th of `last + 1` values; the ends are exact, and so are round steps (0.3 between 0.1 and 0.5).
+/// The `n`th of `last + 1` values; the ends are exact, and so are round steps (0.3 between 0.1 and 0.5, 1000 between 100 and 10000
+/// by the logarithm).
 fn grid_point(ends @ [from, to]: [f64; 2], n: f64, last: f64, is_log: bool) -> f64 {
     match n {
         _ if n == 0.0 => from,
         _ if n == last => to,
-        _ if is_log => between(ends, n / last, true),
-        _ => (from * (last - n) + to * n) / last,
+        _ if is_log => as_meant(between(ends, n / last, true)),
+        _ => as_meant((from * (last - n) + to * n) / last),
     }
+}
+
+/// A round number where rounding has left one by so little that its last digits alone say so.
+fn as_meant(number: f64) -> f64 {
+    let text = format!("{number:.13e}");
+    if text.contains("000e") { text.parse().unwrap_or(number) } else { number }
 }

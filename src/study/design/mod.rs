@@ -222,6 +222,14 @@ mod tests {
             column(&Design::grid(factors(&["stop.steps=10:40:4"])).unwrap(), 0),
             ["10", "20", "30", "40"]
         );
+        let decades = Design::grid(factors(&["material.young=1e-3:1e9:5:log", "k=1e-3:1e4:8:log"])).unwrap();
+        let of_tens = |key: usize, step: usize| -> Vec<&str> {
+            column(&decades, key).into_iter().step_by(step).take(5).collect()
+        };
+        assert_eq!(of_tens(0, 8), ["0.001", "1", "1000", "1000000", "1000000000"]);
+        assert_eq!(of_tens(1, 1), ["0.001", "0.01", "0.1", "1", "10"]);
+        let even = Design::grid(factors(&["k=-0.3:0.3:7"])).unwrap();
+        assert_eq!(column(&even, 0), ["-0.3", "-0.2", "-0.1", "0", "0.1", "0.2", "0.3"]);
         let log = Design::grid(factors(&["k=1e-4:1:5:log"])).unwrap();
         let values: Vec<f64> = log.runs.iter().map(|run| run[0].number.unwrap()).collect();
         for (value, expected) in values.iter().zip([1e-4, 1e-3, 1e-2, 0.1, 1.0]) {
