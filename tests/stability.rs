@@ -125,6 +125,29 @@ fn a_body_that_does_not_rest_where_it_is_laid_out_has_its_thresholds_too() {
     }
 }
 
+/// One axis drives the other and is not driven back: what a disturbance grows by is that of each alone.
+#[test]
+fn the_poisson_term_changes_no_factor_of_growth() {
+    let shape = "body.shape={kind=\"grid\",columns=5,rows=4}";
+    let held = "roles=[{region={kind=\"edge\",side=\"left\"},role=\"clamped\"}]";
+    for how in [["frame=none", "rule.rest=\"literal\""], ["frame=lagged", "rule.rest=\"balanced\""]] {
+        for order in ["update.order=\"synchronous\"", "update.order=\"sequential\""] {
+            let with = |more: &[&str]| {
+                let scene = load("tension", &[&[NO_PROBES, shape, held, order], &how[..], more].concat());
+                let radius = Subject::of(&scene).expect("linear").sweep().radius();
+                assert!(radius.converged, "{how:?} {order} {more:?}: {radius:?}");
+                radius.radius
+            };
+            let plain = with(&[]);
+            assert!(plain < 1.0, "weights that are a mean: {plain}");
+            for k in ["0.0", "1.0", "20.0"] {
+                let found = with(&[&format!("rule.poisson={{k={k},axis=\"y\"}}")]);
+                assert!((found - plain).abs() < 1e-9, "{how:?} {order} k = {k}: {found}, {plain}");
+            }
+        }
+    }
+}
+
 #[test]
 fn the_measured_factor_is_the_spectral_radius() {
     let scene = load("tension", &[]);

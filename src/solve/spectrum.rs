@@ -8,7 +8,7 @@ use super::arnoldi::{Accuracy, Ritz, Wanted, eigenvalues};
 use crate::flock::frame::Frame;
 use crate::flock::law::Flock;
 use crate::flock::role::Role;
-use crate::flock::rules::{Mean, Rotation};
+use crate::flock::rules::{Mean, Rotation, Rule};
 use crate::flock::splitmix;
 use crate::flock::vectors::Vectors;
 use crate::sweep::{Sweep, Update};
@@ -53,8 +53,8 @@ pub struct LinearSweep<'a> {
 impl<'a> LinearSweep<'a> {
     /// Eigenvalues of it are found in at most so many sweeps, `most`.
     ///
-    /// `None` where the sweep is not linear (weights that depend on distance, power means, corotation) or
-    /// where no particle follows.
+    /// `None` where the sweep is not linear (weights that depend on distance, power means, corotation), where a material has a
+    /// Poisson term besides, or where no particle follows.
     pub fn new(
         flock: &Flock,
         frame: Option<&'a Frame>,
@@ -64,15 +64,16 @@ impl<'a> LinearSweep<'a> {
     ) -> Option<Self> {
         let linear =
             matches!(flock.rule.mean, Mean::Barycentre | Mean::Material { rotation: Rotation::Small });
-        if !linear || !roles.contains(&Role::Follower) {
+        let couples = flock.rule.mean != Mean::Barycentre && flock.rule.poisson.is_some();
+        if !linear || couples || !roles.contains(&Role::Follower) {
             return None;
         }
-        // Without what only shifts the place of rest: loads, rest offsets, the reference itself. The Poisson
-        // term measures how far from the axis a particle is in the reference, so it needs that one.
-        let poisson = flock.rule.poisson.is_some();
-        let reference = if poisson { flock.reference.clone() } else { Vectors::zeros(roles.len()).into() };
-        let rest = if poisson { flock.rest.clone() } else { None };
-        let flock = Flock { reference, rest, forces: None, ..flock.clone() };
+        // Without what only shifts the place of rest: loads, rest offsets, the reference itself. Nor does the Poisson term change an
+        // eigenvalue: one axis drives the other, which never drives it back, and a block triangular matrix has the eigenvalues of its
+        // blocks. With it each would be there twice with one eigenvector, and known to half its digits.
+        let rule = Rule { poisson: None, ..flock.rule };
+        let reference = Vectors::zeros(roles.len()).into();
+        let flock = Flock { rule, reference, rest: None, forces: None, ..flock.clone() };
         let sweep = Sweep::compile(update, &flock, roles);
         Some(Self { flock, frame, roles: roles.to_vec(), sweep, most })
     }
@@ -104,20 +105,15 @@ impl<'a> LinearSweep<'a> {
 
     fn eigenvalues(&self, wanted: (Wanted, Accuracy)) -> (Vec<Ritz>, usize, bool) {
         let count = self.roles.len();
-        // Of the body's own size where the reference is there, so that it does not swallow them.
-        let unit = self.flock.rule.poisson.map_or(1.0, |poisson| poisson.half_width);
-        let base = &self.flock.reference;
-        let mut present = Vectors::clone(base);
-        let mut next = Vectors::zeros(count);
+        let (mut present, mut next) = (Vectors::zeros(count), Vectors::zeros(count));
         let mut apply = |from: &[f64], to: &mut [f64]| {
             for i in 0..count {
-                present.set(i, [base.x[i] + unit * from[2 * i], base.y[i] + unit * from[2 * i + 1]]);
+                present.set(i, [from[2 * i], from[2 * i + 1]]);
             }
             next.clone_from(&present);
             self.sweep.step(&self.flock, self.frame, &present, &mut next);
             for i in 0..count {
-                to[2 * i] = (next.x[i] - base.x[i]) / unit;
-                to[2 * i + 1] = (next.y[i] - base.y[i]) / unit;
+                [to[2 * i], to[2 * i + 1]] = next.get(i);
             }
         };
         let found = eigenvalues(&mut apply, self.start(), wanted, self.most);
