@@ -58,7 +58,17 @@ impl Reader {
     /// A file that cannot be read or is no MCAP file.
     pub fn open(path: &Path) -> Result<Self, RecordError> {
         let no_mcap = || RecordError::NoMcap { path: path.to_owned(), source: McapError::BadMagic };
-        let found = std::fs::metadata(path).map_err(RecordError::io("read", path))?;
+        let found = std::fs::metadata(path).map_err(|error| {
+            let part = path.with_added_extension("part");
+            match part.is_file() {
+                true => RecordError::Refused(format!(
+                    "{} is missing: a program that did not end has left what it recorded in {}; name that file",
+                    path.display(),
+                    part.display()
+                )),
+                false => RecordError::io("read", path)(error),
+            }
+        })?;
         // A device has no end.
         if !found.is_file() {
             return Err(no_mcap());

@@ -169,6 +169,9 @@ fn a_killed_program_s_recording_lacks_its_last_second_at_most() {
     let damage = Reader::open(&part).expect("readable").each(&mut |_| seen += 1);
     assert!(damage.is_some());
     assert!((29..48).contains(&seen), "{seen}");
+    // The name that was asked for leads to it.
+    let said = Reader::open(&path).map(|_| ()).expect_err("not there yet").to_string();
+    assert!(said.contains("f.mcap.part; name that file"), "{said}");
 }
 
 /// With an index of it all: readers that seek, as rosbag2 does, need not repair the file.
