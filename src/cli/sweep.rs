@@ -180,8 +180,11 @@ impl Sweep {
             rows: &self.rows,
         };
         if let Some(name) = arguments.plot.as_deref().filter(|name| !table.has_numbers(name)) {
-            let but = if table.diverged() > 0 { " that did not diverge" } else { "" };
-            note!("caution: `{name}` is a number in no run{but}, so that there is nothing to draw");
+            let why = match table.diverged() {
+                0 => "is a number in no run",
+                _ => "is a number in no run but those that diverged",
+            };
+            note!("caution: `{name}` {why}, so that there is nothing to draw");
         }
         if let Some(caution) = self.ids_elsewhere() {
             note!("caution: {caution}");

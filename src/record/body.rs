@@ -41,8 +41,8 @@ pub struct BodyMessages {
     is_solved_at_once: bool,
     /// The scene's.
     unit: String,
-    /// In a unit of the scene \[m\]; one where it has no known length.
-    metres: f64,
+    /// Metres in one unit of the scene, where its length is known.
+    metres: Option<f64>,
     last: Option<usize>,
     poses: String,
     markers: String,
@@ -68,7 +68,7 @@ impl BodyMessages {
             solved: scene.equilibrium.is_some(),
             is_solved_at_once: scene.is_solved_at_once(),
             unit: scene.unit().to_owned(),
-            metres: metres(scene.unit()).unwrap_or(1.0),
+            metres: metres(scene.unit()),
             every,
             last: None,
             poses: names.topic("~/poses")?,
@@ -107,8 +107,8 @@ impl BodyMessages {
         let present = engine.present();
         let seen = engine
             .of_all(|i| [present.x[i].to_bits(), present.y[i].to_bits(), engine.roles()[i].number().into()]);
-        let metres = self.metres;
-        let state = state(engine, (&self.name, metres), step, header.clone());
+        let metres = self.metres.unwrap_or(1.0);
+        let state = state(engine, &self.name, metres, step, header.clone());
         let diagnostics = self.diagnostics(engine, header.clone(), residual);
         let Some(recorder) = &mut self.recorder else { return };
         let place = |[x, y, _]: &[u64; 3]| [x, y].map(|&bits| metres * f64::from_bits(bits));
@@ -123,9 +123,11 @@ impl BodyMessages {
 
     fn diagnostics(&self, engine: &Engine, header: Header, residual: f64) -> DiagnosticArray {
         let pair = |key: &str, value: String| KeyValue { key: key.into(), value };
-        let unit = match metres(&self.unit) {
+        let unit = match self.metres {
             Some(_) => "m".to_owned(),
-            None => format!("{}, as in the scene: no unit of known length", self.unit),
+            None => {
+                format!("{}, as in the scene: set `unit` to m, cm, mm, in or ft to have metres", self.unit)
+            }
         };
         let mut values = vec![
             pair("residual [1]", format!("{residual:e}")),
@@ -138,7 +140,7 @@ impl BodyMessages {
         let status = DiagnosticStatus {
             level: DiagnosticStatus::OK,
             name: format!("/{NAME}: run"),
-            message: if self.solved { "solved for its rest" } else { "stepping" }.into(),
+            message: if self.solved { "solved for equilibrium" } else { "stepping" }.into(),
             hardware_id: self.name.clone(),
             values,
         };
@@ -206,7 +208,7 @@ fn bonds(engine: &Engine, metres: f64, header: &Header) -> Marker {
     marker
 }
 
-fn state(engine: &Engine, (name, metres): (&str, f64), step: usize, header: Header) -> FormationState {
+fn state(engine: &Engine, name: &str, metres: f64, step: usize, header: Header) -> FormationState {
     let (owned, is_whole) = (engine.body().owned(), engine.parted().is_none());
     let is_of_body = |&i: &usize| owned.contains(&i) && engine.roles()[i].is_body();
     let body: Vec<usize> = engine.body().rows().filter(is_of_body).collect();

@@ -48,7 +48,7 @@ const LENGTHS: [(&str, f64); 11] = [
     ("ft", 0.3048),
 ];
 
-/// Metres in a unit of length of this name; `None` of one that has none, as "unit".
+/// Metres in a unit of length of this name; `None` for any other name.
 pub fn metres(unit: &str) -> Option<f64> {
     LENGTHS.iter().find(|(name, _)| *name == unit).map(|(_, metres)| *metres)
 }

@@ -24,8 +24,9 @@ const OF_WHAT_IS_LEFT: f64 = 1e-3;
 /// Part of a correction that the next one may be, lest the system have too few digits to find it.
 const WORTH_IT: f64 = 0.5;
 
-/// The equilibrium of a system that is that of a body, whose rule is `flock` and whose particles follow, or are held along some
-/// axes (shape \[count\]\[x, y\], or empty); shared with a team, each rank with a part of the body or all with the whole of it.
+/// The equilibrium of the `system` of a body under the loads of its `flock`; particles follow (shape \[count\]), but along the axes
+/// that are held (shape \[count\]\[x, y\], or empty). Shared with a team, each rank with a part of the body or all with the whole of it.
+/// Iterations and residuals are those of the first solve, which are of the rounded system.
 ///
 /// # Errors
 /// As [`solve_shared`].
@@ -65,6 +66,7 @@ pub fn solve_refined(
         system = system.under(&left(&solved.displacement));
         let more = match solve_shared(&system, &again, team) {
             Err(SolveError::Interrupted) => return Err(SolveError::Interrupted),
+            // What was found before stands.
             Err(_) => break,
             Ok(more) => more,
         };
@@ -79,7 +81,7 @@ pub fn solve_refined(
         solved.displacement = refined;
         // Each is the error of what was there before it, and the next one would be as much less again.
         solved.known_to = Some(correction * if last.is_finite() { correction / last } else { 1.0 });
-        (0..2).for_each(|phase| solved.phases[phase].1 += more.phases[phase].1);
+        solved.phases.iter_mut().zip(&more.phases).for_each(|((_, sum), (_, more))| *sum += *more);
         if correction <= request.tolerance {
             break;
         }

@@ -58,7 +58,7 @@ pub fn energy(beam: &Beam, at: &Vectors) -> f64 {
                 let (reference, now) = (from(&beam.body.reference, i, j), from(at, i, j));
                 Corner { reference, displacement: [now[0] - reference[0], now[1] - reference[1]] }
             };
-            cell.element.energy(|k| cell.corner(k, neighbour)).expect("has a direction")
+            cell.element.row(0, |k| cell.corner(k, neighbour)).expect("has a direction").energy
         })
         .sum();
     let work = (0..at.len()).map(|i| {

@@ -28,7 +28,7 @@ fn leaders_move_while_they_lead_and_the_clamped_never_do() {
 
 #[test]
 fn a_role_can_be_taken_by_rule_particle_by_particle() {
-    // Whoever has moved 1.5 is clamped there and then.
+    // What has moved 1.5 is clamped there and then.
     let when = r#"roles[2]={region={kind="all"},role="clamped",when={quantity="displacement",above=1.5}}"#;
     let mut held: Vec<Option<[f64; 2]>> = vec![None; 144];
     let outcome = watched("tension", &[when, "stop.steps=60"], |engine| {

@@ -89,7 +89,7 @@ fn the_liquid_drop_stays_in_one_piece_and_rounds_itself() {
         }
     });
     let engine = &outcome.engine;
-    // Everybody has somebody near and nobody on top of it.
+    // Each has another near, and none on top of it.
     for (i, here) in engine.present().iter().enumerate() {
         let nearest = engine
             .present()

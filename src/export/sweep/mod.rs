@@ -100,8 +100,7 @@ impl Table<'_> {
 
     /// The numbers of an output; of a run that diverged there is none, whatever it was last.
     fn column(&self, n: usize) -> Column {
-        let text = |row: &Row| row.outputs.get(n).filter(|_| !has_diverged(row)).cloned();
-        let value = |row: &Row| text(row).and_then(|text| text.parse::<f64>().ok());
+        let value = |row: &Row| row.outputs.get(n).filter(|_| !has_diverged(row))?.parse::<f64>().ok();
         let values = self.rows.values().map(value).collect();
         Column { name: self.outputs[n].clone(), is_log: false, values, categories: Vec::new() }
     }

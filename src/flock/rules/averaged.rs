@@ -94,8 +94,11 @@ pub fn row<'a>(
             }
         }
     }
-    let energy = 0.5 * k * dilatation * dilatation;
-    Some(PatchRow { force: own.map(|v| -k * dilatation * v), energy, tangent })
+    Some(PatchRow {
+        force: own.map(|v| -k * dilatation * v),
+        energy: 0.5 * k * dilatation * dilatation,
+        tangent,
+    })
 }
 
 #[cfg(test)]

@@ -175,13 +175,6 @@ impl Element {
         })
     }
 
-    /// The energy stored \[force length\]; `None` as [`Element::turn`].
-    pub fn energy(&self, corner: impl Fn(usize) -> Corner) -> Option<f64> {
-        let turn = self.turn(&corner)?;
-        let work = |j: usize| dot(turn.strained(corner(j)), self.pull(j, turn, &corner));
-        Some(0.5 * (0..self.corners()).map(work).sum::<f64>())
-    }
-
     /// [`Element::force_on`] with its derivatives.
     ///
     /// With `z = R' x`, `l = K y`, `w = S g / q`, `a = K S z`, `b = S l - a + (M / q) g` and `c = (S z) . a - z . l`, all in the

@@ -20,7 +20,7 @@ const LOOKS: u32 = 7;
 const MOST_PARTS: u32 = 1024;
 /// Leaders go straight on enough where twice as many parts of their way are together no longer than this many times \[1\].
 const STRAIGHT: f64 = 1.1;
-/// Part of the work of an increment that the body may not store \[1\].
+/// Part of what forces could do at most along the way of an increment that the body may not store \[1\].
 const LOST: f64 = 0.1;
 
 /// A corotated body and what is done to it.
@@ -99,6 +99,12 @@ impl Corotated<'_> {
         Some(Local { force, energy, diagonal, blocks, turn: turn? })
     }
 
+    /// Something of every particle; `None` where any of any rank has none.
+    fn of_all<T: Send>(&self, of_particle: impl Fn(usize) -> Option<T> + Sync + Send) -> Option<Vec<T>> {
+        let all: Option<Vec<T>> = (0..self.follows.len()).into_par_iter().map(of_particle).collect();
+        if self.whole.any(all.is_none()) { None } else { all }
+    }
+
     /// Components of a particle that are not given.
     pub fn free(&self, i: usize) -> [bool; 2] {
         let held = self.held_axes.get(i).copied().unwrap_or_default();
@@ -125,11 +131,7 @@ impl Corotated<'_> {
             false => Some(None),
             true => self.local(i, u).map(Some),
         };
-        let locals: Option<Vec<Option<Local>>> = (0..u.len()).into_par_iter().map(of_particle).collect();
-        if self.whole.any(locals.is_none()) {
-            return None;
-        }
-        let locals = locals?;
+        let locals = self.of_all(of_particle)?;
         let left = |(i, local): (usize, &Option<Local>)| match local {
             None => [0.0; 2],
             Some(local) => {
@@ -217,17 +219,14 @@ impl Corotated<'_> {
             true => self.local(i, &displacement).map(|local| (local.force, local.energy)),
             false => Some(([0.0; 2], 0.0)),
         };
-        let own: Option<Vec<_>> = (0..displacement.len()).into_par_iter().map(of_particle).collect();
-        if self.whole.any(own.is_none()) {
-            return None;
-        }
-        let own = own?;
+        let own = self.of_all(of_particle)?;
         let [energy] = self.whole.sum(|i| [own[i].1]);
         Some(Stored { forces: own.into_iter().map(|(force, _)| force).collect(), energy, displacement })
     }
 
     /// Whether the body is given as much work between two states as it stores: what is too much sets it swinging, so that
-    /// it is no way of rest from one to the other. The work is that of forces which grow along a line.
+    /// it is no way of rest from one to the other. The work is that of forces which grow along a line, and differences are over what
+    /// these could do at most: work itself passes through zero where leaders turn back.
     pub fn keeps_energy(&self, before: &Stored, after: &Stored) -> bool {
         let [work, size] = self.whole.sum(|i| {
             let way = minus(after.displacement.get(i), before.displacement.get(i));

@@ -166,7 +166,7 @@ impl Factor {
         };
         let last = count.saturating_sub(1).max(1) as f64;
         let at = |n: usize| grid_point(ends, n as f64, last, self.is_log);
-        let of = |n: usize| Level::of(if self.is_whole { at(n).round() } else { at(n) });
+        let of = |n: usize| Level::of(if self.is_whole { at(n).round() } else { as_meant(at(n), ends) });
         let levels: Vec<Level> = (0..count).map(of).collect();
         match levels.windows(2).find(|pair| pair[0] == pair[1]) {
             None => Ok(levels),
@@ -230,19 +230,25 @@ fn whole_between([from, to]: [f64; 2], part: f64, is_log: bool) -> f64 {
     between(ends, part, is_log).floor().clamp(from.min(to), from.max(to))
 }
 
-/// The `n`th of `last + 1` values; the ends are exact, and so are round steps (0.3 between 0.1 and 0.5, 1000 between 100 and 10000
-/// by the logarithm).
+/// The `n`th of `last + 1` values; the ends are exact.
 fn grid_point(ends @ [from, to]: [f64; 2], n: f64, last: f64, is_log: bool) -> f64 {
     match n {
         _ if n == 0.0 => from,
         _ if n == last => to,
-        _ if is_log => as_meant(between(ends, n / last, true)),
-        _ => as_meant((from * (last - n) + to * n) / last),
+        _ if is_log => between(ends, n / last, true),
+        _ => (from * (last - n) + to * n) / last,
     }
 }
 
-/// A round number where rounding has left one by so little that its last digits alone say so.
-fn as_meant(number: f64) -> f64 {
+/// A round number between these ends where rounding has left one by so little that its last digits alone say so: 0.3 between 0.1 and
+/// 0.5, zero between -0.7 and 0.3, 1000 between 100 and 10000 by the logarithm.
+fn as_meant(number: f64, [from, to]: [f64; 2]) -> f64 {
+    if number == from || number == to {
+        return number;
+    }
+    if number.abs() < 1e-14 * from.abs().max(to.abs()) && from.signum() != to.signum() {
+        return 0.0;
+    }
     let text = format!("{number:.13e}");
     if text.contains("000e") { text.parse().unwrap_or(number) } else { number }
 }

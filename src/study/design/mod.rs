@@ -230,6 +230,8 @@ mod tests {
         assert_eq!(of_tens(1, 1), ["0.001", "0.01", "0.1", "1", "10"]);
         let even = Design::grid(factors(&["k=-0.3:0.3:7"])).unwrap();
         assert_eq!(column(&even, 0), ["-0.3", "-0.2", "-0.1", "0", "0.1", "0.2", "0.3"]);
+        let across = Design::grid(factors(&["k=-0.7:0.3:11"])).unwrap();
+        assert_eq!(column(&across, 0)[6..9], ["-0.1", "0", "0.1"]);
         let log = Design::grid(factors(&["k=1e-4:1:5:log"])).unwrap();
         let values: Vec<f64> = log.runs.iter().map(|run| run[0].number.unwrap()).collect();
         for (value, expected) in values.iter().zip([1e-4, 1e-3, 1e-2, 0.1, 1.0]) {

@@ -44,6 +44,14 @@ fn force(own: usize, now: &[[f64; 2]; 5]) -> [f64; 2] {
     found.get()
 }
 
+fn energy(own: usize, now: &[[f64; 2]; 5]) -> f64 {
+    let found = std::cell::Cell::new(0.0);
+    felt(own, now, &|cells, corner| {
+        found.set(row(7.0, cells.iter().copied(), corner).expect("has directions").energy);
+    });
+    found.get()
+}
+
 #[test]
 fn forces_balance_and_change_as_the_tangent_says() {
     let (mut sum, mut moment) = ([0.0; 2], 0.0);
@@ -54,6 +62,15 @@ fn forces_balance_and_change_as_the_tangent_says() {
         felt(own, &NOW, &|cells, corner| {
             let row = row(7.0, cells.iter().copied(), corner).expect("has directions");
             assert!((0..2).all(|d| (row.force[d] - here[d]).abs() < 1e-14));
+            for d in 0..2 {
+                let stored = |by: f64| {
+                    let mut now = NOW;
+                    now[own][d] += by;
+                    energy(own, &now)
+                };
+                let gradient = (stored(1e-5) - stored(-1e-5)) / 2e-5;
+                assert!((here[d] + gradient).abs() < 1e-8, "{own}: {here:?} {gradient}");
+            }
             for (slot, block) in row.tangent {
                 let other = if slot == OWN { own } else { slot as usize };
                 for e in 0..2 {
