@@ -33,6 +33,14 @@ fn scoped(swarm: &Swarm, member: &str) -> (Control, NodeScope) {
 }
 
 #[test]
+fn a_loop_for_one_robot_hears_all_that_measure_where_it_keeps_no_distance() {
+    let apart = CROSSING.replace(", clearance = 0.2", "");
+    let heard = |more: &str| scoped(&parse(&format!("{apart}{more}")).expect("a swarm"), "b").1.heard;
+    assert_eq!(heard(""), [0, 1]);
+    assert_eq!(heard("ranges = { tolerance = 0.2, max_faulty = 1 }\n"), [0, 1, 2, 3]);
+}
+
+#[test]
 fn a_loop_for_one_robot_sends_what_a_loop_for_all_sends_and_robots_that_are_no_neighbours_pass_clear() {
     let swarm = parse(CROSSING).expect("a swarm");
     let mut whole = Control::new(&swarm).expect("laid out");

@@ -127,6 +127,13 @@ fn four_neighbours_tolerate_no_liar_and_eight_one() {
     assert!(report.contains("tolerate F = 1"), "{report}");
     let swarm = parse(&lattice("kind = \"chebyshev\"\nradius = 1")).expect("valid");
     assert!(Control::new(&swarm).is_ok());
+    // Targets beyond the neighbours leave the hull of the honest ones without any liar.
+    for beyond in ["feedback = { factor = 0.9, reference = \"previous\" }", "poisson = { k = 0.3 }"] {
+        let text = lattice("kind = \"chebyshev\"\nradius = 1")
+            .replace("[resilience]", &format!("[rule]\n{beyond}\n[resilience]"));
+        let report = refusal(&text);
+        assert!(report.contains("lead beyond them") && report.contains("help:"), "{report}");
+    }
 }
 
 #[test]

@@ -481,3 +481,36 @@ fn declared_noise_slows_no_robot_and_leads_none_aside() {
         }
     }
 }
+
+/// A follower is where the rule has it while the leaders are heard, and nowhere in particular once one is lost for good.
+#[test]
+fn where_a_lost_leader_leaves_no_place_none_is_blamed_for_not_being_there() {
+    let swarm = parse(
+        r#"
+title = "a leader dies"
+radius = 0.1
+links = { kind = "nearest", count = 3 }
+robots = [
+    { name = "a", place = [0.0, 0.0] }, { name = "b", place = [2.0, 0.0] },
+    { name = "c", place = [1.0, 1.0] }, { name = "d", place = [1.0, 2.0] },
+]
+leaders = [
+    { robots = ["a"], program = { kind = "path", points = [{ at = 5.0, displacement = [2.0, 0.0] }] } },
+    { robots = ["b"], program = { kind = "path", points = [{ at = 5.0, displacement = [3.0, 1.0] }] } },
+]
+limits = { speed = 1.0, clearance = 0.2 }
+flight = { duration = 12.0, model = { kind = "integrator" }, bounds = { settling_time = 4.0 }, faults = [{ robot = "b", at = 7.0, what = { kind = "dead" } }] }
+"#,
+    )
+    .expect("a swarm");
+    let (_, report) = flown(&swarm);
+    let facts = report.facts(|number| number.to_string());
+    let of = |name: &str| facts.iter().find(|(known, _)| *known == name).expect("said").1.clone();
+    assert!(
+        of("Settling time").starts_with("not measured: where the robots belong is not known"),
+        "{facts:?}"
+    );
+    assert!(of("From where the rule comes to rest").ends_with("which it is not at the end"), "{facts:?}");
+    let complaint = report.bounds.iter().find_map(|verdict| verdict.complaint()).expect("not kept");
+    assert!(complaint.ends_with("found not measured"), "{complaint}");
+}

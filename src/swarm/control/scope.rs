@@ -60,12 +60,13 @@ impl NodeScope {
 }
 
 /// The members whose poses the loop of one needs, by number, ascending. Its target follows from its neighbours; to keep
-/// a clearance it has to see everyone, for programs and commands may bring any two together.
+/// a clearance it has to see everyone, for programs and commands may bring any two together, and ranges find a lie by the places
+/// of those that measured them.
 fn heard(swarm: &Swarm, control: &Control, member: usize) -> Vec<usize> {
     let formation = control.formation();
     let keeps_clear = control.limits().keeps_apart && swarm.raw.node.hears == RawHears::All;
     let finds_anew = formation.engine().is_some_and(|engine| engine.lasting_neighbours().is_none());
-    if keeps_clear || finds_anew {
+    if keeps_clear || finds_anew || swarm.raw.ranges.is_some() {
         return (0..formation.count()).collect();
     }
     let mut heard = formation.depends_on(member);

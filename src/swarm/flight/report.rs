@@ -121,11 +121,16 @@ impl Verdict {
 }
 
 impl FlightReport {
+    /// Whether the robots have a place at the end, by the leaders' motion or the rule, that they are off by so much.
+    fn is_known_at_the_end(&self) -> bool {
+        [self.affine_error, self.formation_error].into_iter().flatten().any(|(_, end)| end.is_some())
+    }
+
     /// What was measured, under its names; `number` writes lengths and times.
     pub fn facts(&self, number: impl Fn(f64) -> String) -> Vec<(&'static str, String)> {
         let pair = |(largest, last): (f64, Option<f64>)| match last {
             Some(last) => format!("largest {} m, at the end {} m", number(largest), number(last)),
-            None => format!("largest {} m, none at the end", number(largest)),
+            None => format!("largest {} m while it was known, which it is not at the end", number(largest)),
         };
         let within = number(self.settled_within);
         let settled = match (self.settling_time, self.programs_end) {
@@ -135,6 +140,10 @@ impl FlightReport {
             }
             (None, _) if self.affine_error.is_none() && self.formation_error.is_none() => {
                 "not measured: the robots have no place by the leaders' motion, and none of rest is known"
+                    .to_owned()
+            }
+            (None, _) if !self.is_known_at_the_end() => {
+                "not measured: where the robots belong is not known at the end, as where a leader is lost"
                     .to_owned()
             }
             (None, _) if self.programs_ended => format!("never within {within} m"),
@@ -314,7 +323,8 @@ fn verdicts(
     // The robot that kept the formation from being settled.
     let unsettled =
         by_shape.rfind(|one| one.is_some_and(|one| !at_most(one.value, bounds.settled_within))).flatten();
-    let [unsettled, at_end] = [unsettled, at_end].map(|one| one.filter(|_| report.programs_ended));
+    let [unsettled, at_end] =
+        [unsettled, at_end].map(|one| one.filter(|_| report.programs_ended && report.is_known_at_the_end()));
     let all = [
         kept("affine_error", bounds.affine_error, report.affine_error.map(|(most, _)| most), largest(affine)),
         kept("final_error", bounds.final_error, last, at_end),

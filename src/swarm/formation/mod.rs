@@ -396,6 +396,14 @@ impl Formation {
     /// # Errors
     /// A sentence that names the robot and what it lacks.
     pub(crate) fn require_support(&self, liars: usize) -> Result<(), String> {
+        // A target beyond its neighbours leaves the hull that bounds what liars can do.
+        let rule = self.engine().map(|engine| engine.flock().rule);
+        if rule.is_some_and(|rule| rule.feedback.is_some() || rule.poisson.is_some()) {
+            return Err(
+                "needs targets among the neighbours, and `rule.feedback` and `rule.poisson` lead beyond them"
+                    .to_owned(),
+            );
+        }
         // What is left of weights of both signs may add up to nothing, by which it is divided.
         if let Some(Weights::Scalar(weights)) = self.engine().map(|engine| &engine.flock().weights)
             && weights.iter().any(|&weight| weight < 0.0)

@@ -17,7 +17,7 @@ pub struct RawNode {
     pub pose_type: RawPoseType,
     /// Topic of each robot's pose, or of the array of all.
     pub pose_topic: String,
-    /// Robots whose poses the node of one robot (`--member`) receives.
+    /// Robots whose poses the node of one robot (`--member`) receives; with `[ranges]` all, for a lie is found by those that measure.
     pub hears: RawHears,
     /// The message type of targets.
     pub target_type: RawTargetType,
