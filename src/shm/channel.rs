@@ -6,7 +6,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use iceoryx2::port::notifier::Notifier;
-use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{
     AllocationStrategy, BackpressureStrategy, CallbackProgression, MessagingPattern, PortName, Service as _,
@@ -295,11 +295,17 @@ impl<T: Payload> Writer<T> {
             .map_err(|error| ShmError::Service {
                 service: opened.name.clone(),
                 reason: format!("no writer more: {error}"),
-                help: format!(
-                    "at most {} can share it, and it takes {:.0} MB of /dev/shm for slices of {most}",
-                    capacity.writers,
-                    1e-6 * (slices * most * size_of::<T>()) as f64
-                ),
+                help: match error {
+                    PublisherCreateError::ExceedsMaxSupportedPublishers => format!(
+                        "at most {} can write to it: end another, take another name, or keep apart by {}",
+                        capacity.writers,
+                        domain::VARIABLE
+                    ),
+                    _ => format!(
+                        "it takes {:.0} MB of /dev/shm for slices of {most}",
+                        1e-6 * (slices * most * size_of::<T>()) as f64
+                    ),
+                },
             })?;
         let notifier = opened.event.notifier_builder().create();
         let notifier = notifier.map_err(|error| opened.port("writer", error, capacity.writers))?;
