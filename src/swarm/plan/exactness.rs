@@ -91,14 +91,19 @@ fn on_the_way(formation: &Formation, name: &str) -> Option<ManoeuvreError> {
     let mut found: f64 = 0.0;
     let mut start = 0.0;
     for leg in &manoeuvre.legs {
-        let at = |part: f64| largest(formation, manoeuvre.affine(start + leg.seconds * part));
+        let begun = start;
+        start += leg.seconds + leg.hold;
+        let at = |part: f64| largest(formation, manoeuvre.affine(begun + leg.seconds * part));
         let looks: Option<Vec<f64>> = (0..=PARTS).map(|n| at(n as f64 / PARTS as f64)).collect();
         let looks = looks?;
         let best = (0..=PARTS).max_by(|&a, &b| looks[a].total_cmp(&looks[b]))?;
         found = found.max(looks[best]);
+        if looks[best] == 0.0 {
+            continue;
+        }
         let [mut low, mut high] =
             [best.saturating_sub(1), (best + 1).min(PARTS)].map(|n| n as f64 / PARTS as f64);
-        for _ in 0..if looks[best] > 0.0 { NARROWINGS } else { 0 } {
+        for _ in 0..NARROWINGS {
             let third = (high - low) / 3.0;
             let [first, second] = [at(low + third)?, at(high - third)?];
             found = found.max(first).max(second);
@@ -108,7 +113,6 @@ fn on_the_way(formation: &Formation, name: &str) -> Option<ManoeuvreError> {
                 high -= third;
             }
         }
-        start += leg.seconds + leg.hold;
     }
     Some(ManoeuvreError { name: name.to_owned(), largest: found })
 }

@@ -25,7 +25,7 @@ mod words;
 use serde::Serialize;
 
 use super::formation::Formation;
-use crate::flock::manoeuvre::Demand;
+use crate::flock::manoeuvre::{Demand, Manoeuvre};
 use crate::flock::rounding::{ROUNDING, at_most};
 use crate::flock::vectors::distance;
 use crate::scene::SceneError;
@@ -144,9 +144,9 @@ pub struct SpeedMargin {
     pub least_braking_lag_s: Option<f64>,
     /// `flight.bounds.affine_error` \[m\].
     pub bound: Option<f64>,
-    /// Speed of a steady program up to which leaders and followers keep within that bound of their places by it \[m/s\], at most the
-    /// speed limit, and that alone without a bound; absent where neither is given or reached, and where there is a bound and
-    /// the lag is not known.
+    /// The highest speed of a steady program at which every robot, leaders included, stays within that bound of its place, at
+    /// most the speed limit \[m/s\]. Without a bound it is the speed limit. It is absent where nothing limits it. It is
+    /// absent, too, where there is a bound and the lag is not known.
     pub reachable: Option<f64>,
     /// The demands of each manoeuvre.
     pub manoeuvres: Vec<ManoeuvreSpeed>,
@@ -173,15 +173,14 @@ impl SwarmPlan {
         let period = raw.control.period;
         let leaders = (0..formation.count()).filter(|&m| formation.leads(m)).count();
         let not_linear = not_linear(formation, swarm);
-        let convergence = convergence(formation, swarm).filter(|_| not_linear.is_none());
-        let not_predicted = convergence.is_none().then(|| match not_linear {
-            _ if leaders == formation.count() => "every robot leads",
-            Some(why) => why,
-            None => "the rule is not linear",
-        });
+        let predicted = match not_linear {
+            Some(why) => Err(why),
+            None => convergence(formation, swarm).ok_or("the rule is not linear"),
+        }
+        .map_err(|why| if leaders == formation.count() { "every robot leads" } else { why });
         let map = PeriodMap::of(formation, raw.control.sweeps).filter(|_| not_linear.is_none());
-        let lag =
-            lag(swarm, formation, map.as_ref(), convergence).map_err(|why| not_predicted.unwrap_or(why));
+        let lag = lag(swarm, formation, map.as_ref(), predicted);
+        let convergence = predicted.ok();
         let delay = f64::from(raw.flight.delay) + f64::from(raw.flight.jitter);
         let mut plan = Self {
             name: swarm.name.clone(),
@@ -210,7 +209,7 @@ impl SwarmPlan {
             },
             speed: speed(swarm, &flight, lag, delay),
             exactness: Exactness::of(swarm, formation),
-            not_predicted,
+            not_predicted: predicted.err(),
             convergence,
             cautions: Vec::new(),
         };
@@ -218,7 +217,7 @@ impl SwarmPlan {
         plan.cautions = lasting(&plan)
             .into_iter()
             .chain(cautions::of(swarm, &flight))
-            .chain(beyond_bound(swarm, &plan.speed))
+            .chain(beyond_bound(formation, &plan.speed))
             .chain(real)
             .collect();
         Ok(plan)
@@ -300,19 +299,21 @@ fn lag(
     swarm: &Swarm,
     formation: &Formation,
     map: Option<&PeriodMap>,
-    convergence: Option<Convergence>,
+    convergence: Result<Convergence, &'static str>,
 ) -> Result<f64, &'static str> {
     if formation.is_led_here() && (0..formation.count()).all(|m| formation.leads(m)) {
         return Ok(0.0);
     }
-    if let Some(map) = map {
-        return map.lag().ok_or(NEVER_STEADY);
-    }
-    let Convergence { factor, .. } = convergence.ok_or("the rule is not linear")?;
+    let Convergence { factor, .. } = convergence?;
+    // 1 - A has an inverse where disturbances grow too, but no lag comes of it.
     if factor >= 1.0 {
         return Err(NEVER_STEADY);
     }
-    lag_when_led(formation, swarm.raw.control.sweeps, factor).ok_or("it would take long for so many robots")
+    match map {
+        Some(map) => map.lag().ok_or(NEVER_STEADY),
+        None => lag_when_led(formation, swarm.raw.control.sweeps, factor)
+            .ok_or("it would take long to compute for so many robots"),
+    }
 }
 
 fn speed(swarm: &Swarm, flight: &Flight, lag: Result<f64, &'static str>, delay: f64) -> SpeedMargin {
@@ -369,12 +370,13 @@ fn reachable(error: f64, lag: f64, ways: f64, limits: &Limits, period: f64) -> O
 
 /// How far behind its target a robot is kept at a steady speed, by a limit of acceleration \[m\].
 fn braking_way(speed: f64, limits: &Limits, period: f64) -> f64 {
-    let (dynamics, most) =
-        (DoubleIntegrator { speed: f64::INFINITY, acceleration: limits.acceleration }, limits.acceleration);
-    match () {
-        () if most.is_infinite() => 0.0,
-        () if limits.brakes => dynamics.braking_way([speed, 0.0], period)[0],
-        () => speed * speed / (2.0 * most),
+    let acceleration = limits.acceleration;
+    if acceleration.is_infinite() {
+        0.0
+    } else if limits.brakes {
+        DoubleIntegrator { speed: f64::INFINITY, acceleration }.braking_way([speed, 0.0], period)[0]
+    } else {
+        speed * speed / (2.0 * acceleration)
     }
 }
 
@@ -384,19 +386,20 @@ fn needed(formation: &Formation, name: &str) -> Option<ManoeuvreSpeed> {
     Some(ManoeuvreSpeed { name: name.to_owned(), needed, acceleration })
 }
 
-/// Manoeuvres within the speed limit, but too fast for the bound.
-fn beyond_bound<'a>(swarm: &'a Swarm, speed: &'a SpeedMargin) -> impl Iterator<Item = String> + 'a {
+/// Manoeuvres within the speed limit, one of whose legs is too fast for the bound.
+fn beyond_bound<'a>(formation: &'a Formation, speed: &'a SpeedMargin) -> impl Iterator<Item = String> + 'a {
     let limit = speed.limit.unwrap_or(f64::INFINITY);
     let too_fast = move |(bound, reachable): (f64, f64)| {
-        // Robots that would lag by that time fall behind by a part of it alone in a leg that is shorter.
         let lag = bound / reachable;
-        let brief = move |name: &str| {
-            let all = swarm.manoeuvres.iter().filter(move |one| one.name == name);
-            let shortest = all.flat_map(|one| &one.legs).map(|leg| leg.seconds).reduce(f64::min);
-            1.0 - (-0.5 * shortest.unwrap_or(0.0) / lag).exp()
+        let is_beyond = move |leg: &Manoeuvre| {
+            // Robots that would lag by that time fall behind by a part of it alone in a leg that is shorter.
+            let part = 1.0 - (-0.5 * leg.duration() / lag).exp();
+            !at_most(leg.demand(&formation.places).speed * part, reachable)
         };
         let is_fast = move |one: &&ManoeuvreSpeed| {
-            !at_most(one.needed * brief(&one.name), reachable) && at_most(one.needed, limit)
+            let manoeuvre = formation.manoeuvre(&one.name, 0.0);
+            at_most(one.needed, limit)
+                && manoeuvre.is_some_and(|manoeuvre| leg_by_leg(&manoeuvre).any(|leg| is_beyond(&leg)))
         };
         let words = move |ManoeuvreSpeed { name, needed, .. }: &ManoeuvreSpeed| {
             let [needed, reachable] = [*needed, reachable].map(|speed| decimals(speed, 3));
@@ -409,6 +412,16 @@ fn beyond_bound<'a>(swarm: &'a Swarm, speed: &'a SpeedMargin) -> impl Iterator<I
         speed.manoeuvres.iter().filter(is_fast).map(words)
     };
     speed.bound.zip(speed.reachable).into_iter().flat_map(too_fast)
+}
+
+/// Each leg as a manoeuvre of its own.
+fn leg_by_leg(manoeuvre: &Manoeuvre) -> impl Iterator<Item = Manoeuvre> + '_ {
+    let begins = std::iter::once(manoeuvre.from).chain(manoeuvre.legs.iter().map(|leg| leg.posture));
+    begins.zip(&manoeuvre.legs).map(|(from, &leg)| Manoeuvre {
+        about: manoeuvre.about,
+        from,
+        legs: vec![leg],
+    })
 }
 
 fn lasting(plan: &SwarmPlan) -> Option<String> {

@@ -8,10 +8,10 @@ use crate::swarm::formation::{Formation, Seen};
 /// Most followers for the dense algebra of noise and lag: more would take seconds.
 const MOST_FOLLOWERS: usize = 150;
 
-/// Part of the lag of a formation that is led until its lag is steady that may be missing \[1\].
+/// Relative error of a lag found by leading \[1\].
 const STEADY: f64 = 1e-6;
 
-/// Most targets of single robots in that, one for each sweep: more would take seconds.
+/// Most targets computed along one axis in that, one for each robot and sweep: more would take seconds.
 const MOST_TARGETS: f64 = 3e7;
 
 /// One period of the loop as a map of what is seen.

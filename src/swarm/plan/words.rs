@@ -121,7 +121,7 @@ impl SpeedMargin {
             }
             (None, Some(lag), _) if *lag < NOTHING => lines.push((
                 "reachable speed",
-                format!("not limited: {model} robots, with the rule, keep up at any"),
+                format!("not limited: {model} robots, with the rule, keep up at any speed"),
             )),
             _ => {}
         }
@@ -129,7 +129,9 @@ impl SpeedMargin {
             let [speed, acceleration] = [needed, acceleration].map(|value| decimals(*value, 3));
             (
                 "manoeuvre",
-                format!("`{name}` moves a place at up to {speed} m/s, by up to {acceleration} m/s^2"),
+                format!(
+                    "`{name}` moves a place at up to {speed} m/s, accelerating at up to {acceleration} m/s^2"
+                ),
             )
         };
         lines.extend(manoeuvres.iter().map(of_one));

@@ -28,6 +28,7 @@ const MOST_LOOKS: usize = 1000;
 pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
     let formation = flight.control().formation();
     let raw = &swarm.raw;
+    let led = Led::by(flight);
     let one = [
         late_faults(flight, raw),
         short_faults(raw),
@@ -40,8 +41,8 @@ pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
             .flatten(),
         near_at_the_start(flight, raw),
         out_of_range_at_the_start(flight, raw),
-        led_outside(flight),
-        led_out_of_range(flight, raw),
+        led_outside(flight, raw, &led),
+        led_out_of_range(flight, raw, &led),
         in_solids(flight),
         led_into_solids(flight),
     ];
@@ -150,17 +151,19 @@ fn out_of_range_at_the_start(flight: &Flight, raw: &RawSwarm) -> Option<String> 
     ))
 }
 
-fn led_outside(flight: &Flight) -> Option<String> {
+fn led_outside(flight: &Flight, raw: &RawSwarm, led: &Led) -> Option<String> {
+    raw.limits.geofence.as_ref()?;
     let (filter, formation) = (flight.control().filter(), flight.control().formation());
-    let names = led_where(flight, &|m, place| !filter.is_fenced_in(place, formation.radii[m] - ROUNDING))?;
+    let names = led.to(formation, &|m, place| !filter.is_fenced_in(place, formation.radii[m] - ROUNDING))?;
     Some(format!(
         "programs lead these robots out of limits.geofence: {names}; they will stop at the fence: widen it, or change their \
          programs"
     ))
 }
 
-fn led_out_of_range(flight: &Flight, raw: &RawSwarm) -> Option<String> {
-    let names = led_where(flight, &|_, place| !flight.control().is_believed(place))?;
+fn led_out_of_range(flight: &Flight, raw: &RawSwarm, led: &Led) -> Option<String> {
+    let control = flight.control();
+    let names = led.to(control.formation(), &|_, place| !control.is_believed(place))?;
     Some(format!(
         "programs lead these robots farther than poses.range = {} m from the formation's middle, where no pose is \
          believed: {names}; raise it, or change their programs",
@@ -168,24 +171,37 @@ fn led_out_of_range(flight: &Flight, raw: &RawSwarm) -> Option<String> {
     ))
 }
 
-/// Robots that programs lead to a bad place, or that follow to one and are not laid out at such a one.
-fn led_where(flight: &Flight, is_bad: &dyn Fn(usize, [f64; 2]) -> bool) -> Option<String> {
-    let (control, formation) = (flight.control(), flight.control().formation());
-    let end = match formation.programs_end() {
-        end if end.is_finite() => end,
-        _ => flight.periods() as f64 * control.period(),
-    };
-    // Where several programs lead, those that follow are looked at by the first.
-    let times = looks((0..formation.count()).find_map(|m| formation.lead(m)), end);
-    let thinned = times.iter().step_by(times.len().div_ceil(MOST_LOOKS));
-    let places: Vec<Vectors> = thinned.filter_map(|&time| rest(formation, time)).collect();
-    formation.named(|m| match formation.lead(m) {
-        lead @ Some(_) => {
-            let mut led = looks(lead, end).into_iter().filter_map(|time| formation.led_to(m, time));
-            led.any(|place| is_bad(m, place))
-        }
-        None => !is_bad(m, formation.places.get(m)) && places.iter().any(|all| is_bad(m, all.get(m))),
-    })
+/// Where programs lead the robots.
+struct Led {
+    /// Time until which they are looked at \[s\].
+    end: f64,
+    /// Places of the members at rest, at times until then \[m\]; none where they are not known.
+    rests: Vec<Vectors>,
+}
+
+impl Led {
+    fn by(flight: &Flight) -> Self {
+        let (control, formation) = (flight.control(), flight.control().formation());
+        let end = match formation.programs_end() {
+            end if end.is_finite() => end,
+            _ => flight.periods() as f64 * control.period(),
+        };
+        // Where several programs lead, those that follow are looked at by the first.
+        let times = looks((0..formation.count()).find_map(|m| formation.lead(m)), end);
+        let thinned = times.iter().step_by(times.len().div_ceil(MOST_LOOKS));
+        Self { end, rests: thinned.filter_map(|&time| rest(formation, time)).collect() }
+    }
+
+    /// Robots that programs lead to a bad place, or that follow to one and are not laid out at such a one.
+    fn to(&self, formation: &Formation, is_bad: &dyn Fn(usize, [f64; 2]) -> bool) -> Option<String> {
+        formation.named(|m| match formation.lead(m) {
+            lead @ Some(_) => {
+                let mut led = looks(lead, self.end).into_iter().filter_map(|time| formation.led_to(m, time));
+                led.any(|place| is_bad(m, place))
+            }
+            None => !is_bad(m, formation.places.get(m)) && self.rests.iter().any(|all| is_bad(m, all.get(m))),
+        })
+    }
 }
 
 /// Places at which the members rest behind leaders that are where their programs have them at `time` \[s\]; `None` where that is not
@@ -197,6 +213,9 @@ fn rest(formation: &Formation, time: f64) -> Option<Vectors> {
 
 /// Times at which a leader's way is looked at, until `end` \[s\]: within each of its parts, however short.
 fn looks(lead: Option<&Lead>, end: f64) -> Vec<f64> {
+    if end <= 0.0 {
+        return vec![0.0];
+    }
     let ends: Vec<f64> = match lead {
         Some(Lead::Motion { motion: Motion::Keyframes { frames, .. }, since }) => {
             frames.iter().map(|frame| since + frame.step).collect()
@@ -271,7 +290,7 @@ fn fast_manoeuvres(raw: &RawSwarm, formation: &Formation) -> impl Iterator<Item 
     all.flat_map(move |ManoeuvreSpeed { name, needed, acceleration }| {
         let asked = [
             (needed, fastest, "moves a robot's place at up to", "m/s, above limits.speed"),
-            (acceleration, most, "changes a place's velocity by up to", "m/s^2, above limits.acceleration"),
+            (acceleration, most, "accelerates a robot's place at up to", "m/s^2, above limits.acceleration"),
         ];
         let above = asked.into_iter().filter(|(value, limit, ..)| !at_most(*value, *limit));
         let words = above.map(|(value, _, asks, limit)| format!("{asks} {} {limit}", decimals(value, 3)));
@@ -303,15 +322,22 @@ fn leaping_paths(swarm: &Swarm, flight: &Flight) -> impl Iterator<Item = String>
     let (formation, robots) = (flight.control().formation(), flight.fleet().robots());
     let reach = swarm.raw.limits.speed.unwrap_or(f64::INFINITY) * swarm.raw.control.period;
     (0..swarm.leaders.len()).filter_map(move |k| {
-        let leap = |(m, motion): (usize, &Motion)| leap(motion, minus(robots[m].position, formation.places.get(m)));
-        let farthest = motions(formation, k).map(leap).fold(0.0, f64::max);
-        (!at_most(farthest, reach)).then(|| {
+        let away = |m: usize| minus(robots[m].position, formation.places.get(m));
+        let begins = motions(formation, k).map(|(m, motion)| begins_away(motion, away(m))).fold(0.0, f64::max);
+        let leaps = motions(formation, k).map(|(_, motion)| leap(motion)).fold(0.0, f64::max);
+        // Points at the very beginning come from files alone, which hold none.
+        let asked = [
+            (begins, "begins", " from where its robot starts", "let it begin there"),
+            (leaps, "leaps by up to", "", "interpolate it \"linear\" or \"smooth\""),
+        ];
+        let words = |(way, does, from, mend): (f64, &str, &str, &str)| {
             format!(
-                "the program of leaders[{k}] leaps by up to {} m, farther than limits.speed leads in a period: the robot \
-                 will be on its way for a while; interpolate it \"linear\" or \"smooth\", from where the robot starts",
-                decimals(farthest, 3)
+                "the program of leaders[{k}] {does} {} m{from}, farther than limits.speed leads in a period: the robot will be \
+                 on its way for a while; {mend}",
+                decimals(way, 3)
             )
-        })
+        };
+        asked.into_iter().find(|(way, ..)| !at_most(*way, reach)).map(words)
     })
 }
 
@@ -324,18 +350,19 @@ fn motions(formation: &Formation, entry: usize) -> impl Iterator<Item = (usize, 
     })
 }
 
-/// Largest leap of a program that holds each of its points until the next, or begins with one at once \[m\]; `start` is the
-/// robot's displacement as it begins.
-fn leap(motion: &Motion, start: [f64; 2]) -> f64 {
-    let Motion::Keyframes { frames, interpolation } = motion else { return 0.0 };
-    let at_once = frames.first().is_some_and(|frame| frame.step <= 0.0);
-    let start = Keyframe { step: 0.0, displacement: if at_once { start } else { [0.0; 2] } };
+/// How far from its robot a program that has a point at its very beginning has it \[m\]; `start` is the robot's displacement then.
+fn begins_away(motion: &Motion, start: [f64; 2]) -> f64 {
+    let Motion::Keyframes { frames, .. } = motion else { return 0.0 };
+    let first = frames.first().filter(|frame| frame.step <= 0.0);
+    first.map_or(0.0, |first| distance(start, first.displacement))
+}
+
+/// Largest leap of a program that holds each of its points until the next \[m\].
+fn leap(motion: &Motion) -> f64 {
+    let Motion::Keyframes { frames, interpolation: Interpolation::Hold } = motion else { return 0.0 };
+    let start = Keyframe { step: 0.0, displacement: [0.0; 2] };
     let begins = std::iter::once(&start).chain(frames);
-    let leaps = begins
-        .zip(frames)
-        .filter(|(from, to)| *interpolation == Interpolation::Hold || to.step <= from.step)
-        .map(|(from, to)| distance(from.displacement, to.displacement));
-    leaps.fold(0.0, f64::max)
+    begins.zip(frames).map(|(from, to)| distance(from.displacement, to.displacement)).fold(0.0, f64::max)
 }
 
 /// Largest speed of a program by keyframes that goes from one to the next \[m/s\].

@@ -3,6 +3,12 @@
 use super::*;
 use crate::swarm::flight::Record;
 
+/// 180 followers and more, too many for a map.
+const MANY: [&str; 2] = [
+    "body.shape={ kind = \"grid\", columns = 15, rows = 15 }",
+    "leaders[0].region={ kind = \"edge\", side = \"left\" }",
+];
+
 /// The largest error of a flight by the leaders' program whose steepest speed is this \[m/s\], over its bound of 0.2 m.
 fn error_at(speed: f64, set: &[&str]) -> f64 {
     let seconds = 40.0;
@@ -77,20 +83,37 @@ fn a_lag_that_is_steady_when_led_is_that_of_the_map_and_one_of_many_robots_is_kn
         let lag = plan.speed.lag_s.expect("linear") / plan.period_s;
         assert!((led / lag - 1.0).abs() < 1e-5, "{led} {lag}");
     }
-    // 180 followers, and 9 in a frame.
-    let many = [
-        "control.sweeps=10",
-        "body.shape={ kind = \"grid\", columns = 15, rows = 15 }",
-        "leaders[0].region={ kind = \"edge\", side = \"left\" }",
-    ];
-    let frame = ["frame=\"immediate\""];
-    for set in [&many[..], &frame] {
+    // And 9 followers in a frame.
+    let many = [&MANY[..], &["control.sweeps=10"]].concat();
+    for set in [&many[..], &["frame=\"immediate\""]] {
         let speed = SwarmPlan::new(&led_on(set)).expect("laid out").speed;
         let (lag, reachable) = (speed.lag_s.expect("linear"), speed.reachable.expect("bounded"));
         assert!((lag * reachable - 0.2).abs() < 1e-6, "{speed:?}");
         let error = error_at(reachable, set);
         assert!((0.9..1.005).contains(&error), "{set:?}: {error} of the bound at {reachable} m/s");
     }
+}
+
+#[test]
+fn followers_whose_disturbances_grow_have_no_lag_however_few_they_are() {
+    let grows = "rule={ feedback = { factor = 0.5 } }";
+    // 132 followers.
+    let few = ["body.shape={ kind = \"grid\", columns = 12, rows = 12 }", MANY[1]];
+    for set in [few, MANY].map(|set| [&[grows], &set[..]].concat()) {
+        let plan = SwarmPlan::new(&led_on(&set)).expect("laid out");
+        assert!(plan.convergence.expect("linear").factor > 1.0, "{plan}");
+        let SpeedMargin { lag_s, lag_not_known, reachable, .. } = plan.speed;
+        assert_eq!((lag_s, lag_not_known, reachable), (None, Some(NEVER_STEADY), None), "{set:?}");
+    }
+}
+
+#[test]
+fn a_lag_that_would_take_long_to_compute_is_left_out() {
+    let long = [&MANY[..], &["control.sweeps=100000"]].concat();
+    let plan = SwarmPlan::new(&led_on(&long)).expect("laid out");
+    assert_eq!((plan.speed.lag_s, plan.speed.reachable), (None, None), "{plan}");
+    let words = "lag               not computed: it would take long to compute for so many robots";
+    assert!(plan.to_string().contains(words), "{plan}");
 }
 
 #[test]
@@ -115,16 +138,24 @@ fn where_no_lag_is_known_a_bound_has_no_reachable_speed_and_the_plan_says_why() 
     let words = "manoeuvre `m` moves a robot's place at up to 1.500 m/s, and steadily led robots are within \
                  flight.bounds.affine_error = 0.09 m of their places up to 0.300 m/s";
     assert!(plan.cautions.iter().any(|one| one.contains(words)), "{plan}");
-    // A way that is over before they are that far behind.
-    let brief = ["manoeuvres=[{ name = \"m\", legs = [{ seconds = 0.1, translate = [0.05, 0.0] }] }]"]
-        .map(str::to_owned);
-    let brief = Swarm::parse("two", "two.toml", text, &brief, None).unwrap_or_else(|e| panic!("{e}"));
-    let brief = SwarmPlan::new(&brief).expect("laid out");
-    assert!(brief.cautions.iter().all(|one| !one.contains("affine_error")), "{brief}");
+    let is_beyond = |legs: &str| {
+        let set = [format!("manoeuvres=[{{ name = \"m\", legs = [{legs}] }}]")];
+        let swarm = Swarm::parse("two", "two.toml", text, &set, None).unwrap_or_else(|e| panic!("{e}"));
+        let plan = SwarmPlan::new(&swarm).expect("laid out");
+        plan.cautions.iter().any(|one| one.contains("affine_error"))
+    };
+    // A way that is over before they are that far behind, alone and before a slow one.
+    let brief = "{ seconds = 0.1, translate = [0.05, 0.0] }";
+    assert!(!is_beyond(brief));
+    assert!(!is_beyond(&format!("{brief}, {{ seconds = 100.0, translate = [1.0, 0.0] }}")));
+    let long = "{ seconds = 100.0, translate = [200.0, 0.0] }";
+    assert!(is_beyond(&format!("{long}, {{ seconds = 0.01, translate = [200.0, 0.0] }}")));
+    // Of legs that end in one place the second begins where the first ends.
+    assert!(!is_beyond(&format!("{brief}, {{ seconds = 0.3, hold = 9.0, translate = [0.05, 0.0] }}")));
     // 6 * 9 / 9^2 m/s^2 as the leg begins.
     assert!((plan.speed.manoeuvres[0].acceleration - 6.0 / 9.0).abs() < 1e-9, "{plan}");
     let words =
-        "manoeuvre `m` changes a place's velocity by up to 0.667 m/s^2, above limits.acceleration: robots";
+        "manoeuvre `m` accelerates a robot's place at up to 0.667 m/s^2, above limits.acceleration: robots";
     assert!(plan.cautions.iter().any(|one| one.contains(words)), "{plan}");
-    assert!(plan.to_string().contains("1.500 m/s, by up to 0.667 m/s^2"), "{plan}");
+    assert!(plan.to_string().contains("1.500 m/s, accelerating at up to 0.667 m/s^2"), "{plan}");
 }
