@@ -38,7 +38,7 @@ pub fn percent(part: f64) -> String {
 }
 
 /// "a", "a, b and c", "a, b, c and 4 more".
-pub(crate) fn listed(names: &[impl AsRef<str>]) -> String {
+pub fn listed(names: &[impl AsRef<str>]) -> String {
     const MOST_NAMED: usize = 3;
     let names: Vec<&str> = names.iter().map(AsRef::as_ref).collect();
     let (named, others) = names.split_at(names.len().min(MOST_NAMED));
