@@ -1,6 +1,8 @@
 //! The equilibrium of a body of which each rank lays out a part has the bits of one that is laid out as a whole.
 
-use flockform::continuum::equilibrium::run_to_equilibrium_shared;
+use std::ops::ControlFlow;
+
+use flockform::continuum::equilibrium::{run_to_equilibrium, run_to_equilibrium_shared};
 use flockform::continuum::parts::laid_out_whole_for;
 use flockform::continuum::plan::Plan;
 
@@ -144,6 +146,28 @@ fn a_large_equilibrium_along_an_outline_too() {
     assert_at_rest_the_same("multigrid", &[fitted, fine, single, "equilibrium.tolerance=1e-4"]);
     let coarser = "lattice={kind=\"square\",spacing=0.1}";
     assert_at_rest_the_same("conjugate-gradients", &[fitted, coarser, "equilibrium.tolerance=1e-3"]);
+}
+
+/// Beside a stiff inclusion rounding ends the first solve, and what it leaves is solved for again.
+#[test]
+fn what_rounding_leaves_is_solved_for_again_alike() {
+    let stiff = "body.inclusions=[{shape={kind=\"disc\",centre=[15.5,6.0],radius=2.6},\
+         material={kind=\"isotropic\",young=1e12,poisson=0.2}}]";
+    for solver in ["multigrid", "conjugate-gradients"] {
+        for more in [&[][..], &["body.outline=\"fitted\""]] {
+            let sets = [&[stiff, LOADS], more].concat();
+            assert_at_rest_the_same(solver, &sets);
+            let asked = format!("equilibrium={{solver=\"{solver}\",tolerance=1e-7}}");
+            let scene = plate(PLATE, &[&[&asked[..]], &sets[..], &["record.probes=[]"]].concat());
+            let outcome = run_to_equilibrium(&scene, planned(&scene), &mut |_, _| ControlFlow::Continue(()));
+            let solved = outcome.expect("solvable").solved.expect("solved");
+            assert!(
+                !solved.converged && solved.known_to.is_some_and(|error| error < 1e-3),
+                "{solver} {more:?}: {:?}",
+                solved.known_to
+            );
+        }
+    }
 }
 
 #[test]
