@@ -131,8 +131,7 @@ fn solve_linear(
     request: &Request,
     team: Option<&Team>,
 ) -> Result<Solved, SolveError> {
-    let (flock, body) = (&plan.setup.flock, &plan.setup.body);
-    solve_refined((flock, body), (&follows(plan), &held_axes(plan)), system, request, team)
+    solve_refined((&plan.setup.flock, &plan.setup.body), system, request, team)
 }
 
 /// Every rank solves the whole body, or each has a part of it, and all end alike.

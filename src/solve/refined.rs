@@ -24,15 +24,14 @@ const OF_WHAT_IS_LEFT: f64 = 1e-3;
 /// Part of a correction that the next one may be, lest the system have too few digits to find it.
 const WORTH_IT: f64 = 0.5;
 
-/// The equilibrium of the `system` of a body under the loads of its `flock`; particles follow (shape \[count\]), but along the axes
-/// that are held (shape \[count\]\[x, y\], or empty). Shared with a team, each rank with a part of the body or all with the whole of it.
+/// The equilibrium of the `system` of a body under the loads of its `flock`; shared with a team, each rank with a part of the body or
+/// all with the whole of it.
 /// Iterations and residuals are those of the first solve, which are of the rounded system.
 ///
 /// # Errors
 /// As [`solve_shared`].
 pub fn solve_refined(
     (flock, body): (&Flock, &Body),
-    (follows, held_axes): (&[bool], &[[bool; 2]]),
     mut system: System,
     request: &Request,
     team: Option<&Team>,
@@ -43,15 +42,12 @@ pub fn solve_refined(
         return Ok(solved);
     }
     let whole = Whole::new(body, team.filter(|_| body.part.is_some()));
+    // What it leaves where something is held, the system does not look at.
     let left = |u: &Vectors| -> Vectors {
-        let force = |i: usize| {
-            if !(follows[i] && body.exact().contains(&i)) {
-                return [0.0; 2];
-            }
-            let load = flock.forces.as_ref().map_or([0.0; 2], |forces| forces.get(i));
-            let force = plus(flock.force_under(i, u), load);
-            let held = held_axes.get(i).copied().unwrap_or_default();
-            [0, 1].map(|axis| if held[axis] { 0.0 } else { force[axis] })
+        let load = |i: usize| flock.forces.as_ref().map_or([0.0; 2], |forces| forces.get(i));
+        let force = |i: usize| match body.exact().contains(&i) {
+            true => plus(flock.force_under(i, u), load(i)),
+            false => [0.0; 2],
         };
         let force: Vec<[f64; 2]> = (0..u.len()).into_par_iter().map(force).collect();
         force.into_iter().collect()
