@@ -40,6 +40,7 @@ use crate::swarm::control::Control;
 use crate::swarm::flight::Fleet;
 use crate::swarm::formation::Formation;
 use crate::swarm::pace::{Pace, system_time};
+use crate::swarm::plan::cautions;
 use crate::swarm::robots::Robot;
 use crate::swarm::transport::complaints::Complaints;
 use crate::swarm::transport::{RobotsEnd, catch_up, fly};
@@ -230,6 +231,7 @@ impl RobotNodes {
     pub fn open(swarm: &Swarm, arguments: &RosArguments, layout: Layout) -> Result<Self, NodeError> {
         let control = Control::new(swarm)?;
         let formation = control.formation();
+        cautions::of_simulated_robots(&swarm.raw).inspect(|caution| tracing::warn!("{caution}"));
         let fleet = Fleet::new(swarm, formation)?;
         let link = Link::open(swarm, formation, arguments, layout)?;
         Ok(Self {

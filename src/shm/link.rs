@@ -50,7 +50,7 @@ impl Controller {
         let alone = part.mine.first().copied().filter(|_| part.mine.len() < count);
         Ok(Self {
             poses: Reader::open(peer, space, POSES, &Capacity::SWARM)?,
-            ranges: has_ranges.then(|| Reader::open(peer, space, RANGES, &Capacity::SWARM)).transpose()?,
+            ranges: has_ranges.then(|| Reader::open(peer, space, RANGES, &for_ranges(count))).transpose()?,
             leaders: Reader::open(peer, space, LEADERS, &Capacity::SWARM)?,
             targets: Writer::open_for(peer, space, TARGETS, &Capacity::SWARM, part.mine.len(), alone)?,
             hears: among(&part.heard),
@@ -146,6 +146,16 @@ impl ControllerEnd for Controller {
 
 /// Ranges a robot in a slice; where robots measure more others, a period takes several slices.
 const OTHERS: usize = 32;
+/// Ranges that wait for a reader at most \[1\]: 24 MiB.
+const WAITING: usize = 1 << 20;
+
+/// Two periods wait for a late loop in which each of `count` robots measures all others, up to [`WAITING`]: where some of a
+/// period are lost, they are those of the same observers each time.
+fn for_ranges(count: usize) -> Capacity {
+    let two_periods = 2 * count.saturating_sub(1).div_ceil(OTHERS);
+    let most = WAITING / (count * OTHERS).max(1);
+    Capacity { queue: two_periods.min(most).max(Capacity::SWARM.queue), ..Capacity::SWARM }
+}
 
 /// The robots' end: of all of them, or of one.
 pub struct Robots {
@@ -154,6 +164,8 @@ pub struct Robots {
     targets: Reader<WireTarget>,
     count: usize,
     period: u64,
+    /// Of more ranges than wait for the loop.
+    complaints: Complaints,
 }
 
 impl Robots {
@@ -168,6 +180,7 @@ impl Robots {
             targets: Reader::open(peer, space, TARGETS, &Capacity::SWARM)?,
             count,
             period: 0,
+            complaints: Complaints::default(),
         })
     }
 
@@ -177,7 +190,7 @@ impl Robots {
     /// As [`Writer::open`].
     pub fn with_ranges(mut self, peer: &Peer, space: &str) -> Result<Self, ShmError> {
         let at_once = self.count * OTHERS;
-        self.ranges = Some(Writer::open(peer, space, RANGES, &Capacity::SWARM, at_once)?);
+        self.ranges = Some(Writer::open(peer, space, RANGES, &for_ranges(self.count), at_once)?);
         Ok(self)
     }
 
@@ -209,7 +222,17 @@ impl RobotsEnd for Robots {
             let reason = "these robots were opened without ranges".to_owned();
             return Err(ShmError::Send { service: RANGES.to_owned(), reason });
         };
-        for some in ranges.chunks((self.count * OTHERS).max(1)) {
+        let at_once = (self.count * OTHERS).max(1);
+        let waiting = at_once * for_ranges(self.count).queue;
+        if ranges.len() > waiting {
+            let text = format_args!(
+                "{}: {} ranges in a period, and {waiting} wait for a node at most: others are lost; give `ranges.reach` less",
+                writer.service(),
+                ranges.len()
+            );
+            self.complaints.warn("ranges", 0, system_time(), &text);
+        }
+        for some in ranges.chunks(at_once) {
             writer.send(now, self.period, some.len(), |k| {
                 let Range { observer, of, distance, stamp } = some[k];
                 WireRange { observer: observer as u32, of: of as u32, distance, stamp }

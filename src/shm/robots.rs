@@ -9,6 +9,7 @@ use crate::scene::swarm::Swarm;
 use crate::swarm::control::Control;
 use crate::swarm::flight::Fleet;
 use crate::swarm::pace::{Due, Pace, system_time};
+use crate::swarm::plan::cautions;
 use crate::swarm::transport::{RobotsEnd, aim, catch_up, fly};
 
 /// The robots, and the end they speak through.
@@ -30,6 +31,7 @@ impl SimulatedRobots {
     pub fn open(swarm: &Swarm, domain: &Domain) -> Result<Self, ShmError> {
         let control = Control::new(swarm)?;
         let formation = control.formation();
+        cautions::of_simulated_robots(&swarm.raw).inspect(|caution| tracing::warn!("{caution}"));
         folders::require_room(room_for_swarm(formation.count()))?;
         let peer = domain.join("flockform_robots")?;
         let end = Robots::open(&peer, &swarm.name, formation.count())?;

@@ -104,6 +104,15 @@ fn both_say_what_they_serve_as_over_ros_2() {
     }
 }
 
+#[test]
+fn robots_say_that_they_do_no_commands_of_a_flight() {
+    let command =
+        "flight.commands=[{ after = 5, what = { kind = \"lead\", robot = \"robot_1\", to = [0.0, 0.0] } }]";
+    let mut running = start_with(&domain_name(), &["robots", "--set", command], Stdio::piped());
+    lines(&mut running)("flight.commands are done by `flockform swarm`");
+    assert_eq!(running.terminate(), Some(0));
+}
+
 fn start_with(domain: &str, arguments: &[&str], log: Stdio) -> Running {
     let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
     command.args(arguments).args(["square", "--transport", "shm"]);

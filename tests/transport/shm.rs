@@ -53,6 +53,25 @@ impl Transport for Shm {
 kept!(Shm::new(3), Shm { more: &MEASURED, ..Shm::new(3) }, (Shm::new(1000), (0..1000).collect()));
 
 #[test]
+fn two_periods_in_which_all_measure_all_wait_for_a_late_loop() {
+    const COUNT: usize = 200;
+    let mut shm = Shm { more: &MEASURED, ..Shm::new(COUNT) };
+    let (mut controller, mut robots) = (shm.controller(), shm.robots());
+    meet(&mut controller, &mut robots, 0);
+    let pairs = || (0..COUNT).flat_map(|i| (0..COUNT).filter(move |&j| j != i).map(move |j| (i, j)));
+    let mut expected = Vec::new();
+    for stamp in [1.0, 2.0] {
+        let of_pair = |(observer, of)| Range { observer, of, distance: 1.0, stamp };
+        let period: Vec<Range> = pairs().map(of_pair).collect();
+        robots.send_ranges(stamp, &period).expect("sent");
+        expected.extend(period.into_iter().map(Received::Range));
+    }
+    let mut found = Vec::new();
+    controller.receive(2.0, &mut |received| found.push(received));
+    assert!(found == expected, "{} of {} ranges", found.len(), expected.len());
+}
+
+#[test]
 fn ranges_by_or_of_nobody_are_left_out_and_counted() {
     let mut shm = Shm { more: &MEASURED, ..Shm::new(3) };
     let (mut controller, mut robots) = (shm.controller(), shm.robots());

@@ -57,7 +57,7 @@ pub fn watch(swarm: &Swarm, formation: &Formation, speed: f64) -> WatchLimits {
         centre: formation.middle(),
         range: poses.range,
         jump_speed: poses.jump_speed.unwrap_or(speed),
-        recover: poses.recover as u32,
+        recover: u32::try_from(poses.recover).unwrap_or(u32::MAX),
         period: Some(period),
         ranges: swarm
             .raw

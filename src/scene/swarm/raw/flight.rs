@@ -33,7 +33,7 @@ pub struct RawFlight {
     pub start: Vec<RawStart>,
     /// Faults of single robots.
     pub faults: Vec<RawFault>,
-    /// Commands from outside on the way, by ascending period.
+    /// Commands from outside on the way, by ascending period; `flockform robots` does none of them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 200000))]
     pub commands: Vec<RawCommand>,

@@ -16,7 +16,7 @@ use crate::scene::text::{decimals, number};
 use crate::swarm::flight::{Flight, lasts};
 use crate::swarm::formation::{Formation, Lead, first_few};
 use crate::swarm::safety::foot;
-pub use network::{late_without_speed, of_real_robots};
+pub use network::{late_without_speed, of_real_robots, of_simulated_robots};
 
 /// Parts of a leg, or of a program's way from one point to the next, between which a leader's way is looked at.
 const PARTS: usize = 40;

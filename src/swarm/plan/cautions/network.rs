@@ -106,6 +106,13 @@ pub fn of_real_robots(limits: &Limits) -> impl Iterator<Item = &'static str> {
     late_without_speed(limits).into_iter().chain(exact_poses(limits))
 }
 
+/// Caution where simulated robots are moved by nodes, which do nothing at a given time.
+pub fn of_simulated_robots(raw: &RawSwarm) -> Option<&'static str> {
+    (!raw.flight.commands.is_empty()).then_some(
+        "flight.commands are done by `flockform swarm` and `flockform live` alone: here they have no effect",
+    )
+}
+
 /// The velocity of a robot that takes time to brake follows from its poses.
 fn exact_poses(limits: &Limits) -> Option<&'static str> {
     (limits.brakes && limits.acceleration.is_finite() && limits.deviation == 0.0).then_some(
