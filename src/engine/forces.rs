@@ -185,15 +185,17 @@ impl Forces {
 
     /// What is left on all followers over the loads, or, without loads, over the reactions, sizes added up \[1\].
     pub(crate) fn share_left(&self, engine: &Engine) -> f64 {
-        let sum = |forces: &Vectors| {
-            let size = |[x, y]: [f64; 2]| [f64::hypot(x, y)];
-            engine.sum_over([0.0], engine.body().owned().map(|i| (i, size(forces.get(i)))))[0]
-        };
         let left = self.left_on_followers(engine).into_iter().map(|(i, left)| (i, [left]));
         let [left] = engine.sum_over([0.0], left);
-        let loads = sum(&self.loads);
-        let whole = if loads > 0.0 { loads } else { sum(&self.supports(engine)) };
-        left / whole
+        let [loads, supports] = self.sizes(engine);
+        left / if loads > 0.0 { loads } else { supports }
+    }
+
+    /// Loads, and reactions, on all particles, sizes added up \[force\].
+    pub(crate) fn sizes(&self, engine: &Engine) -> [f64; 2] {
+        let supports = self.supports(engine);
+        let of = |i: usize| [&self.loads, &supports].map(|forces| forces.get(i)).map(|[x, y]| x.hypot(y));
+        engine.sum_over([0.0; 2], engine.body().owned().map(|i| (i, of(i))))
     }
 
     /// Followers, and the size of the force that is left on each along components that are free \[force\].

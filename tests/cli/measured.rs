@@ -236,6 +236,39 @@ fn an_equilibrium_that_rounding_holds_is_a_caution() {
     }
 }
 
+/// Resultants of loads that balance each other are rounding, and so is what is left of them.
+#[test]
+fn loads_or_leaders_that_balance_each_other_are_no_caution() {
+    let text = |more: &str| {
+        format!(
+            "title = \"A bar pulled at both ends\"\nlattice = {{ kind = \"square\", spacing = 0.5 }}\n\
+             body = {{ shape = {{ kind = \"rectangle\", min = [0.0, -1.0], max = [5.0, 1.0] }} }}\n\
+             material = {{ kind = \"isotropic\", young = 1000.0, poisson = 0.3 }}\n\
+             rule = {{ mean = {{ kind = \"material\" }} }}\nequilibrium = {{}}\n{more}"
+        )
+    };
+    let at = |x: f64| format!("{{ kind = \"disc\", centre = [{x:?}, 0.0], radius = 0.01 }}");
+    let pull = |piece: u32, by: f64| {
+        format!(
+            "{{ kind = \"traction\", region = {{ kind = \"outline\", pieces = [{piece}] }}, traction = [{by:?}, 0.0] }}"
+        )
+    };
+    let loaded = format!(
+        "roles = [{{ region = {}, role = \"clamped\" }}, {{ region = {}, role = \"clamped\", axis = \"y\" }}]\n\
+         loads = [{}, {}]\n",
+        at(0.0),
+        at(5.0),
+        pull(2, 1.0),
+        pull(4, -1.0)
+    );
+    let led = "roles = [{ region = { kind = \"boundary\" }, role = \"leader\", \
+               motion = { kind = \"affine\", stretch = [1.01, 1.0], steps = 1 } }]\n";
+    for more in [&*loaded, led] {
+        let said = run(&[&text(more)], &["--figures", "none"], 0).1;
+        assert!(!said.contains("out of balance"), "{said}");
+    }
+}
+
 /// Of 1.75 m of height whole cells of 0.5 m leave 1.5 m, a seventh less.
 #[test]
 fn a_run_of_whole_cells_says_when_they_are_not_the_shape() {
