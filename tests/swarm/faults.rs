@@ -638,3 +638,24 @@ fn a_robot_whose_goal_another_stands_on_goes_round_it_once_and_waits() {
         assert!(moved < 1e-6 && apart < 0.51 && least > 0.5 - 1e-9, "{limits}: {moved}, {apart}, {least}");
     }
 }
+
+/// Where goals are what neighbours make of them, a robot went to and fro beside the one in its way for ever, and those around it with it.
+#[test]
+fn a_robot_that_comes_no_nearer_on_its_detours_waits() {
+    for dead in ["robot_6", "robot_17"] {
+        let sets = [
+            "control.sweeps=1",
+            "manoeuvres[0].legs=[{ seconds = 10.0, translate = [6.0, 2.0], rotate = 90.0 }]",
+            &format!("flight.faults=[{{ robot = \"{dead}\", at = 1.5, what = {{ kind = \"dead\" }} }}]"),
+        ];
+        let mut flight = Flight::new(&load_swarm("square", &sets)).expect("a flight");
+        fly(&mut flight, 900);
+        let before = flight.fleet().places();
+        for _ in 0..40 {
+            fly(&mut flight, 1);
+            let now = flight.fleet().places();
+            let farthest = (0..25).map(|m| distance(before.get(m), now.get(m))).fold(0.0, f64::max);
+            assert!(farthest < 0.05, "{dead} is dead: {farthest} m, 45 s after the beginning");
+        }
+    }
+}

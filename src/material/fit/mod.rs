@@ -60,7 +60,7 @@ const STAYS: f64 = 1e-11;
 pub enum FitError {
     /// The shape is narrower than the spacing of the lattice.
     #[error(
-        "the shape is {width:.6} wide near ({:.6}, {:.6}), less than the spacing of the lattice, which is {spacing:.6}",
+        "what is between its sides, or between it and another outline, is {width:.6} wide near ({:.6}, {:.6}), less than the spacing of the lattice, which is {spacing:.6}",
         .place[0], .place[1]
     )]
     Narrow {

@@ -6,8 +6,8 @@
 //! further back if that does not move it either, until the straight way is free again for as long as
 //! it took to give it up. The aim is projected onto the cell like any other: a detour cannot do harm.
 //! It finds the way round convex things, not out of a maze. A member that has gone once round its goal and not come to it, because
-//! another stands on it, say, goes no way but the straight one until that has brought it nearer, the goal is another, or a thousand times as
-//! long.
+//! another stands on it, say, or some times to and fro and not begun one nearer to it, goes no way but the straight one until that has
+//! brought it nearer, the goal is another, or a thousand times as long.
 
 use std::f64::consts::TAU;
 
@@ -20,7 +20,12 @@ const BLOCKED: f64 = 0.1;
 /// The same, above which its way is free \[1\].
 const FREE: f64 = 0.5;
 
-/// Ticks for which a member waits that has gone once round its goal, over those for which it is blocked before a detour \[1\].
+/// Detours after which a member waits that has begun none of them nearer to its goal than the one before them, by this share of its size
+/// \[1\].
+const FRUITLESS: u8 = 4;
+const NEARER: f64 = 0.25;
+
+/// Ticks for which a member waits, over those for which it is blocked before a detour \[1\].
 const WAIT: u32 = 1000;
 
 /// One member's memory.
@@ -37,6 +42,9 @@ pub struct Detour {
     goal: [f64; 2],
     last: [f64; 2],
     round: f64,
+    /// Detours since the one that began nearest to the goal, that one included \[1\], and the distance at which that was \[m\].
+    begins: u8,
+    nearest: f64,
 }
 
 /// A member's possible and actual motion at a tick; all relative to it.
@@ -69,9 +77,9 @@ impl Detour {
         self.turn > 0
     }
 
-    /// Whether it has gone once round the goal.
+    /// Whether it has gone once round the goal, or to and fro.
     fn waits(self) -> bool {
-        self.round.abs() >= TAU
+        self.round.abs() >= TAU || self.begins > FRUITLESS
     }
 
     /// The aim in place of `wanted` \[m\], relative to the member.
@@ -93,7 +101,7 @@ impl Detour {
             return;
         }
         if length(minus(goal, self.goal)) > size {
-            (self.goal, self.round) = (goal, 0.0);
+            (self.goal, self.round, self.begins) = (goal, 0.0, 0);
         } else {
             self.round += cross(self.last, wanted).atan2(dot(self.last, wanted));
         }
@@ -118,7 +126,11 @@ impl Detour {
         self.turn = match self.turn {
             0 => {
                 self.begun = distance;
-                FIRST
+                if self.begins == 0 || distance < self.nearest - NEARER * size {
+                    (self.begins, self.nearest) = (0, distance);
+                }
+                self.begins += 1;
+                if self.waits() { 0 } else { FIRST }
             }
             _ if is_free => 0,
             LAST => FIRST,
