@@ -6,8 +6,8 @@
 //! further back if that does not move it either, until the straight way is free again for as long as
 //! it took to give it up. The aim is projected onto the cell like any other: a detour cannot do harm.
 //! It finds the way round convex things, not out of a maze. A member that has gone once round its goal and not come to it, because
-//! another stands on it, say, or some times to and fro and not begun one nearer to it, goes no way but the straight one until that has
-//! brought it nearer, the goal is another, or a thousand times as long.
+//! another stands on it, say, goes no way but the straight one until that has brought it nearer, the goal is another, or a thousand times as
+//! long. So does one that went to and fro, some detours having begun where the one before them did: for longer after each more.
 
 use std::f64::consts::TAU;
 
@@ -20,13 +20,12 @@ const BLOCKED: f64 = 0.1;
 /// The same, above which its way is free \[1\].
 const FREE: f64 = 0.5;
 
-/// Detours after which a member waits that has begun none of them nearer to its goal than the one before them, by this share of its size
-/// \[1\].
+/// Detours in a row after which a member waits that began at one place, to this share of its size \[1\].
 const FRUITLESS: u8 = 4;
-const NEARER: f64 = 0.25;
+const THERE: f64 = 0.1;
 
-/// Ticks for which a member waits, over those for which it is blocked before a detour \[1\].
-const WAIT: u32 = 1000;
+/// Ticks for which a member waits at most, over those for which it is blocked before a detour \[1\].
+const WAIT: u32 = 1024;
 
 /// One member's memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -42,9 +41,11 @@ pub struct Detour {
     goal: [f64; 2],
     last: [f64; 2],
     round: f64,
-    /// Detours since the one that began nearest to the goal, that one included \[1\], and the distance at which that was \[m\].
+    /// Detours in a row that began at one place \[1\], and that place \[m, world frame\].
     begins: u8,
-    nearest: f64,
+    place: [f64; 2],
+    /// Ticks for which it waits yet \[1\].
+    wait: u32,
 }
 
 /// A member's possible and actual motion at a tick; all relative to it.
@@ -77,9 +78,10 @@ impl Detour {
         self.turn > 0
     }
 
-    /// Whether it has gone once round the goal, or to and fro.
-    fn waits(self) -> bool {
-        self.round.abs() >= TAU || self.begins > FRUITLESS
+    /// Goes no way but the straight one for so many times as long as it was blocked before a detour.
+    fn wait(&mut self, patience: u32, times: u32, distance: f64) {
+        (self.turn, self.ticks, self.begun, self.round) = (0, 0, distance, 0.0);
+        self.wait = patience.saturating_mul(times);
     }
 
     /// The aim in place of `wanted` \[m\], relative to the member.
@@ -92,10 +94,10 @@ impl Detour {
     /// Takes note of a tick; `patience` is that of [`Limits`](super::Limits).
     pub fn update(&mut self, patience: u32, tick: &Tick) {
         let Tick { size, scale, goal, wanted, distance, straight, direct, moved } = *tick;
-        if self.waits() {
-            self.ticks += 1;
-            let is_over = self.ticks / WAIT >= patience;
-            if is_over || distance < self.begun - size || length(minus(goal, self.goal)) > size {
+        if self.wait > 0 {
+            self.wait -= 1;
+            self.last = wanted;
+            if distance < self.begun - size || length(minus(goal, self.goal)) > size {
                 self.reset();
             }
             return;
@@ -106,9 +108,8 @@ impl Detour {
             self.round += cross(self.last, wanted).atan2(dot(self.last, wanted));
         }
         self.last = wanted;
-        if self.waits() {
-            (self.turn, self.ticks, self.begun) = (0, 0, distance);
-            return;
+        if self.round.abs() >= TAU {
+            return self.wait(patience, WAIT, distance);
         }
         let progress = dot(direct, wanted) / (distance * scale);
         // Sliding back to where the detour began is no progress: the way is free that leads straight on,
@@ -126,11 +127,14 @@ impl Detour {
         self.turn = match self.turn {
             0 => {
                 self.begun = distance;
-                if self.begins == 0 || distance < self.nearest - NEARER * size {
-                    (self.begins, self.nearest) = (0, distance);
+                let place = minus(goal, wanted);
+                let is_there = self.begins > 0 && length(minus(place, self.place)) <= THERE * size;
+                self.begins = if is_there { self.begins.saturating_add(1) } else { 1 };
+                self.place = place;
+                if self.begins > FRUITLESS {
+                    return self.wait(patience, WAIT.min(1 << self.begins.min(31)), distance);
                 }
-                self.begins += 1;
-                if self.waits() { 0 } else { FIRST }
+                FIRST
             }
             _ if is_free => 0,
             LAST => FIRST,
@@ -140,7 +144,7 @@ impl Detour {
 
     /// Whether the state is the initial one.
     pub fn is_fresh(self) -> bool {
-        self.turn == 0 && self.ticks == 0 && !self.waits()
+        self.turn == 0 && self.ticks == 0 && self.wait == 0
     }
 
     pub fn reset(&mut self) {
