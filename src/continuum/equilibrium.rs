@@ -131,7 +131,8 @@ fn solve_linear(
     request: &Request,
     team: Option<&Team>,
 ) -> Result<Solved, SolveError> {
-    solve_refined((&plan.setup.flock, &plan.setup.body), system, request, team)
+    let follows = |i: usize| plan.setup.roles[i] == Role::Follower;
+    solve_refined((&plan.setup.flock, &plan.setup.body, &follows), system, request, team)
 }
 
 /// Every rank solves the whole body, or each has a part of it, and all end alike.

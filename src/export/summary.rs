@@ -356,8 +356,8 @@ fn unbalanced(scene: &Scene, outcome: &Outcome, measured: Option<&Measured>) -> 
         measured.filter(|_| scene.rotation() == Rotation::Small)?.mechanics.out_of_balance(&outcome.engine);
     (off > BALANCED.max(TOLERATED * asked.request.tolerance)).then(|| {
         format!(
-            "reactions and loads are out of balance by {off:.1e} of their size: rounding of the stiffness holds so slender, or so uneven, a body as supports \
-             do, and its displacements are off by as much; use rotation = \"corotated\", which leaves turns out, or a wider spacing"
+            "reactions and loads are out of balance by {off:.1e} of their size: what rounding, or the tolerance of the solver, leaves holds so slender, or \
+             so uneven, a body as supports do, and its displacements are off by as much; use another equilibrium.solver, rotation = \"corotated\", which leaves turns out, or a wider spacing"
         )
     })
 }

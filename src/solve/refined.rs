@@ -5,6 +5,9 @@
 //! it, and no solver of the rounded system sees it. Forces from the *differences* of displacements do not have it, and what
 //! they leave is solved for again (iterative refinement; N. J. Higham, *Accuracy and Stability of Numerical Algorithms*, 2002,
 //! chapter 12).
+//!
+//! Where a tolerance was not reached that is known. Where it was, loads and reactions say whether it was enough: it is a part of the force
+//! that leaders would need with all followers at zero, which in a slender body is many times what they do need.
 
 use rayon::prelude::*;
 
@@ -14,15 +17,18 @@ use crate::flock::body::Body;
 use crate::flock::law::{Flock, Weights};
 use crate::flock::rules::Rule;
 use crate::flock::vectors::Vectors;
-use crate::geometry::point::plus;
+use crate::geometry::point::{cross, minus, plus};
 use crate::ranks::Team;
 
 /// Solves after the first one, at most.
 const MOST: usize = 8;
-/// Tolerance of each of them: the system is rounded itself.
+/// Tolerance of each of them where rounding ended the first: the system is rounded itself.
 const OF_WHAT_IS_LEFT: f64 = 1e-3;
 /// Part of a correction that the next one may be, lest the system have too few digits to find it.
 const WORTH_IT: f64 = 0.5;
+/// Part of loads and reactions that need not balance \[1\], and the same over the tolerance of the solve.
+const BALANCED: f64 = 1e-7;
+const TOLERATED: f64 = 10.0;
 
 /// The equilibrium of the `system` of a body under the loads of its `flock`; shared with a team, each rank with a part of the body or
 /// all with the whole of it.
@@ -31,20 +37,27 @@ const WORTH_IT: f64 = 0.5;
 /// # Errors
 /// As [`solve_shared`].
 pub fn solve_refined(
-    (flock, body): (&Flock, &Body),
+    (flock, body, follows): (&Flock, &Body, &dyn Fn(usize) -> bool),
     mut system: System,
     request: &Request,
     team: Option<&Team>,
 ) -> Result<Solved, SolveError> {
     let mut solved = solve_shared(&system, request, team)?;
-    let is_material = flock.rule == Rule::MATERIAL && matches!(flock.weights, Weights::Matrix(_));
-    if solved.known_to.is_none() || !is_material {
+    let Weights::Matrix(weights) = &flock.weights else { return Ok(solved) };
+    let whole = Whole::new(body, team.filter(|_| body.part.is_some()));
+    let load = |i: usize| flock.forces.as_ref().map_or([0.0; 2], |forces| forces.get(i));
+    if flock.rule != Rule::MATERIAL {
         return Ok(solved);
     }
-    let whole = Whole::new(body, team.filter(|_| body.part.is_some()));
+    let held = |i: usize| if follows(i) { weights.held(i) } else { [true; 2] };
+    let off = |u: &Vectors| out_of_balance((flock, &whole), &held, &load, u);
+    // Without any force it is no number.
+    let is_balanced = |u: &Vectors| !(off(u) > BALANCED.max(TOLERATED * request.tolerance));
+    if solved.known_to.is_none() && is_balanced(&solved.displacement) {
+        return Ok(solved);
+    }
     // What it leaves where something is held, the system does not look at.
     let left = |u: &Vectors| -> Vectors {
-        let load = |i: usize| flock.forces.as_ref().map_or([0.0; 2], |forces| forces.get(i));
         let force = |i: usize| match body.exact().contains(&i) {
             true => plus(flock.force_under(i, u), load(i)),
             false => [0.0; 2],
@@ -53,7 +66,7 @@ pub fn solve_refined(
         force.into_iter().collect()
     };
     let again = Request {
-        tolerance: OF_WHAT_IS_LEFT.max(request.tolerance),
+        tolerance: if solved.converged { request.tolerance } else { OF_WHAT_IS_LEFT.max(request.tolerance) },
         solver: Choice::This(solved.solver),
         ..*request
     };
@@ -72,6 +85,8 @@ pub fn solve_refined(
         tracing::debug!(correction, "refined by forces from differences of displacements");
         if correction.is_nan() || correction > WORTH_IT * last {
             solved.known_to = Some(correction + last).filter(|part| part.is_finite());
+            // To its tolerance, of a system that is another.
+            solved.converged = false;
             break;
         }
         solved.displacement = refined;
@@ -83,5 +98,31 @@ pub fn solve_refined(
         }
         last = correction;
     }
+    // An iteration does not find what its right-hand side has too little of.
+    solved.known_to = solved.known_to.map(|part| part.max(off(&solved.displacement)));
+    solved.converged &= is_balanced(&solved.displacement);
     Ok(solved)
+}
+
+/// The part of loads and reactions, of forces or of moments, by which they are not in balance \[1\]; reactions are those of the
+/// components that are `held`.
+fn out_of_balance(
+    (flock, whole): (&Flock, &Whole<'_>),
+    held: &dyn Fn(usize) -> [bool; 2],
+    load: &dyn Fn(usize) -> [f64; 2],
+    u: &Vectors,
+) -> f64 {
+    let (low, high) = whole.body.bounds();
+    let middle = [0, 1].map(|axis| 0.5 * (low[axis] + high[axis]));
+    let [x, y, moment, forces, moments] = whole.sum(|i| {
+        let (mut outer, held) = (load(i), held(i));
+        if held.contains(&true) {
+            let inner = flock.force_under(i, u);
+            (0..2).filter(|&axis| held[axis]).for_each(|axis| outer[axis] = -inner[axis]);
+        }
+        let moment = cross(minus(flock.reference.get(i), middle), outer);
+        [outer[0], outer[1], moment, outer[0].hypot(outer[1]), moment.abs()]
+    });
+    let of_moment = moment.abs() / moments.max(forces * whole.body.lattice.spacing());
+    (x.hypot(y) / forces).max(of_moment)
 }
