@@ -101,12 +101,12 @@ impl Beam {
         let way = |_: f64| Vectors::zeros(self.body.count());
         let request = Request { solver: Choice::This(solver), tolerance: 1e-12, ..Request::default() };
         corotated::solve(
-            &self.flock,
-            &self.body,
+            (&self.flock, &self.body),
             self.follows.clone(),
             self.held_axes.clone(),
             &corotated::Way::whole(&way),
             &request,
+            None,
         )
     }
 
