@@ -173,7 +173,7 @@ fn a_swarm_takes_the_commands_that_its_file_allows() {
             let request = lifecycle_msgs::ChangeStateRequest { transition };
             call::<lifecycle_msgs::ChangeState>(&client, &request, &mut || swarm.tick()).success
         };
-        assert!(!change(&mut swarm, State::Inactive.label()), "no transition");
+        assert!(!change(&mut swarm, State::Inactive.name()), "no transition");
         assert_eq!(change(&mut swarm, "deactivate"), commands == "stop-only");
         assert!(!change(&mut swarm, "activate"));
     }

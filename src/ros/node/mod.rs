@@ -475,7 +475,7 @@ impl FormationNode {
             (true, _) => Ok(format!("{label}: done")),
             (false, Some(reason)) => Err(reason.to_owned()),
             (false, None) => {
-                Err(format!("{label}: not possible, the node is {}", self.lifecycle.state().label()))
+                Err(format!("{label}: not possible, the node is {}", self.lifecycle.state().name()))
             }
         });
         for (number, command) in own {
