@@ -48,6 +48,9 @@
 //! # Ok::<(), flockform::SceneError>(())
 //! ```
 
+#[macro_use]
+mod named;
+
 pub mod continuum;
 pub mod engine;
 pub mod flock;

@@ -129,12 +129,7 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
             if let Some(recording) = &recording {
                 node.record(recording.sink()).map_err(NodeError::from)?;
             }
-            if let Some(level) = log::level() {
-                node.serve_log_level(level).map_err(NodeError::from)?;
-            }
-            if let Some(lines) = log::lines() {
-                node.publish_log(lines).map_err(NodeError::from)?;
-            }
+            node.share_log(log::level(), log::lines()).map_err(NodeError::from)?;
             announce(&swarm, node.control());
             if let Some(left) = left {
                 node.restore(left.node);
@@ -311,12 +306,7 @@ pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCod
             let layout = if arguments.node_per_robot { Layout::NodePerRobot } else { Layout::OneNode };
             bound_opening();
             let mut robots = RobotNodes::open(&swarm, ros, layout)?;
-            if let Some(level) = log::level() {
-                robots.serve_log_level(level).map_err(NodeError::from)?;
-            }
-            if let Some(lines) = log::lines() {
-                robots.publish_log(lines).map_err(NodeError::from)?;
-            }
+            robots.share_log(log::level(), log::lines()).map_err(NodeError::from)?;
             announce(robots.fleet().robots().len());
             tracing::info!("{}", robots.reached_at());
             if let Some(left) = life.left() {

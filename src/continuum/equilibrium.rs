@@ -145,8 +145,7 @@ fn solve_corotated(
     const INTERRUPTED: CorotatedError = CorotatedError::Solve(SolveError::Interrupted);
     let (flock, body) = (&plan.setup.flock, &plan.setup.body);
     let parted = team.filter(|_| body.part.is_some());
-    let solved =
-        corotated::solve_in_parts((flock, body), follows(plan), held_axes(plan), way, request, parted);
+    let solved = corotated::solve((flock, body), follows(plan), held_axes(plan), way, request, parted);
     let is_interrupted = solved.as_ref().is_err_and(|error| *error == INTERRUPTED);
     if team.is_some_and(|team| team.any(is_interrupted)) { Err(INTERRUPTED) } else { solved }
 }

@@ -6,11 +6,11 @@ use crate::flock::body::Body;
 use crate::flock::lattice::Site;
 use crate::flock::law::Weights;
 use crate::flock::neighbourhood::Neighbours;
-use crate::flock::rules::{Mean, Rotation};
+use crate::flock::rules::Mean;
 use crate::flock::vectors::distance;
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
-use crate::material::weights::{MaterialWeights, WeightsError};
+use crate::material::weights::{WeightsError, assemble};
 use crate::ranks::Team;
 use crate::scene::{Scene, SceneError, Weights as FixedWeights};
 use crate::solve::affine_weights;
@@ -85,13 +85,8 @@ fn of_material(
     cells: &Cells,
     elastic: &Elastic,
 ) -> Result<Weights, SceneError> {
-    let material = MaterialWeights::assemble(cells, body, neighbours.clone(), elastic);
-    let corotated = scene.mean == Mean::Material { rotation: Rotation::Corotated };
-    let weights = |material: MaterialWeights| match corotated {
-        true => material.corotated_weights(),
-        false => material.weights(),
-    };
-    material.map(|material| Weights::Matrix(weights(material))).map_err(|error| match &body.part {
+    let weights = assemble(cells, body, neighbours, elastic, scene.mean.rotation());
+    weights.map(Weights::Matrix).map_err(|error| match &body.part {
         Some(part) => refuse(scene, &error.in_whole(body, part.whole.neighbours)),
         None => refuse(scene, &error),
     })

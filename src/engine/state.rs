@@ -96,36 +96,6 @@ impl<'a> EngineState<'a> {
         }
     }
 
-    /// The state for later, when the engine has gone on.
-    pub fn into_owned(self) -> EngineState<'static> {
-        let Self {
-            step,
-            present,
-            previous,
-            roles,
-            taken_by,
-            leaders,
-            guided,
-            breaks,
-            activity,
-            broken,
-            after_all,
-        } = self;
-        EngineState {
-            step,
-            present: Cow::Owned(present.into_owned()),
-            previous: Cow::Owned(previous.into_owned()),
-            roles: Cow::Owned(roles.into_owned()),
-            taken_by: Cow::Owned(taken_by.into_owned()),
-            leaders,
-            guided: Cow::Owned(guided.into_owned()),
-            breaks: Cow::Owned(breaks.into_owned()),
-            activity,
-            broken,
-            after_all,
-        }
-    }
-
     /// Steps taken.
     pub fn step(&self) -> usize {
         self.step

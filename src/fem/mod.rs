@@ -57,9 +57,7 @@ mod strain;
 pub use error::FemError;
 pub use material::{Material, Orthotropic, Plane, Stress};
 pub use mesh::Mesh;
-pub use shape_problem::{
-    Field, Holding, PlaneRegion, PortionTraction, ShapeProblem, Support, TractionField, WayField,
-};
+pub use shape_problem::{Field, Holding, PortionTraction, ShapeProblem, Support, TractionField, WayField};
 pub use shape_solve::{Effort, EstimatedError, Level, Reaction, ShapeSolution, solve_shape};
 pub use solution::Solution;
 pub use strain::Strain;

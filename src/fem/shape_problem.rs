@@ -12,7 +12,7 @@ use super::strain::Strain;
 use crate::geometry::outline::{Outline, Place};
 use crate::geometry::piece::Piece;
 use crate::geometry::point::{Point, distance};
-use crate::geometry::portion::Portion;
+use crate::geometry::portion::{Area, Portion};
 
 /// Grading of the mesh at the ends of supports, and at those of loads.
 const AT_SUPPORT: f64 = 0.75;
@@ -30,32 +30,13 @@ pub type WayField<'a> = Box<dyn Fn(f64, Point) -> Point + 'a>;
 /// A traction [N/m2] of the place \[m\] and of the outward normal there, which has length 1.
 pub type TractionField<'a> = Box<dyn Fn(Point, Point) -> Point + 'a>;
 
-/// A part of the plane.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum PlaneRegion {
-    /// An upright rectangle from its lowest to its highest coordinates \[m\]; it may have no width.
-    Box {
-        /// Lowest coordinates.
-        min: Point,
-        /// Highest coordinates.
-        max: Point,
-    },
-    /// \[m\]
-    Disc {
-        /// Coordinates of the middle.
-        centre: Point,
-        /// Distance of the rim from the middle.
-        radius: f64,
-    },
-}
-
 /// A support of a body.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Holding {
     /// Along portions of its outline.
     Portions(Vec<Portion>),
     /// Throughout what a region has of it.
-    Region(PlaneRegion),
+    Region(Area),
     /// Along a straight line between two points of it \[m\].
     Segment([Point; 2]),
     /// At a single point \[m\]. Elasticity yields there without limit under a force, so a body that needs the
@@ -143,11 +124,11 @@ impl<'a> ShapeProblem<'a> {
     /// Lines that the mesh follows: the edges of inclusions and of regions that are held, and segments.
     pub(crate) fn lines(&self) -> Vec<Piece> {
         let of_support = |support: &Support<'_>| match &support.on {
-            Holding::Region(PlaneRegion::Box { min: [a, b], max: [c, d] }) => {
+            Holding::Region(Area::Box { min: [a, b], max: [c, d] }) => {
                 let corners = [[*a, *b], [*c, *b], [*c, *d], [*a, *d]];
                 (0..4).map(|k| Piece::edge(corners[k], corners[(k + 1) % 4])).collect()
             }
-            Holding::Region(PlaneRegion::Disc { centre, radius }) => {
+            Holding::Region(Area::Disc { centre, radius }) => {
                 vec![Piece::arc(*centre, *radius, 0.0, TAU)]
             }
             Holding::Segment([from, to]) => vec![Piece::edge(*from, *to)],
@@ -305,12 +286,7 @@ impl<'a> ShapeProblem<'a> {
                 let sides = mesh.sides().iter().filter(|side| is_in(portions, side));
                 sides.flat_map(|side| mesh.mesh().side_nodes(side.side)).collect()
             }
-            Holding::Region(PlaneRegion::Box { min, max }) => {
-                within(&|p| (0..2).all(|k| p[k] >= min[k] - near && p[k] <= max[k] + near))
-            }
-            Holding::Region(PlaneRegion::Disc { centre, radius }) => {
-                within(&|p| distance(p, *centre) <= radius + near)
-            }
+            Holding::Region(area) => within(&|p| area.contains(p, near)),
             Holding::Segment([from, to]) => {
                 let line = Piece::edge(*from, *to);
                 within(&|p| distance(line.point(line.nearest(p)), p) <= near)

@@ -11,28 +11,21 @@ use super::lattice::{Lattice, Site};
 use super::real::Real;
 use super::vectors::Vectors;
 
-/// Which particles a frame point serves, and when it copies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FrameRule {
-    /// The nearest particles' displacement before the sweep: the edge follows with a delay, which
-    /// is the convexity of the paper's figure 1.
-    Lagged,
-    /// The nearest particles' displacement after the sweep.
-    Immediate,
-    /// The displacement, after the sweep, of the particle opposite across the nearest one.
-    Mirror,
+named! {
+    /// Which particles a frame point serves, and when it copies.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum FrameRule {
+        /// The nearest particles' displacement before the sweep: the edge follows with a delay, which
+        /// is the convexity of the paper's figure 1.
+        Lagged => "lagged",
+        /// The nearest particles' displacement after the sweep.
+        Immediate => "immediate",
+        /// The displacement, after the sweep, of the particle opposite across the nearest one.
+        Mirror => "mirror",
+    }
 }
 
 impl FrameRule {
-    /// The name in scene files.
-    pub fn name(self) -> &'static str {
-        match self {
-            FrameRule::Lagged => "lagged",
-            FrameRule::Immediate => "immediate",
-            FrameRule::Mirror => "mirror",
-        }
-    }
-
     /// Whether the displacements copied are those from before the sweep.
     pub(crate) fn looks_before_the_sweep(self) -> bool {
         self == FrameRule::Lagged

@@ -5,24 +5,24 @@ use std::ops::Range;
 use super::real::Real;
 use super::vectors::Vectors;
 
-/// Particles that a rank sends and receives: (rank, particles), at most one stretch for each rank, in their order.
+/// Particles, or columns, that a rank sends and receives: (rank, particles), at most one stretch for each rank, in their order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Halo {
+pub struct Halo<N = usize> {
     /// Particles of this rank that others need.
-    pub sends: Vec<(usize, Range<usize>)>,
+    pub sends: Vec<(usize, Range<N>)>,
     /// Particles of others that this rank needs.
-    pub receives: Vec<(usize, Range<usize>)>,
+    pub receives: Vec<(usize, Range<N>)>,
 }
 
 /// What is sent and how many words are received: (rank, words).
 pub type Messages = (Vec<(usize, Vec<u64>)>, Vec<(usize, usize)>);
 
-impl Halo {
+impl<N: Copy + Ord> Halo<N> {
     /// The halo of one of so many ranks, by the particles that a rank owns and those that it needs, which may be its own.
     pub fn new(
         (rank, ranks): (usize, usize),
-        owned: impl Fn(usize) -> Range<usize>,
-        needed: impl Fn(usize) -> Range<usize>,
+        owned: impl Fn(usize) -> Range<N>,
+        needed: impl Fn(usize) -> Range<N>,
     ) -> Self {
         let others = || (0..ranks).filter(|&other| other != rank);
         let both = |owner: usize, reader: usize| meet(&owned(owner), &needed(reader));
@@ -31,7 +31,9 @@ impl Halo {
             receives: others().filter_map(|other| Some((other, both(other, rank)?))).collect(),
         }
     }
+}
 
+impl Halo {
     /// The same where the first particle here is this one of the whole.
     #[must_use]
     pub fn here(mut self, first: usize) -> Self {
@@ -62,7 +64,7 @@ impl Halo {
 }
 
 /// The intersection of both stretches, if any.
-fn meet(a: &Range<usize>, b: &Range<usize>) -> Option<Range<usize>> {
+pub fn meet<N: Copy + Ord>(a: &Range<N>, b: &Range<N>) -> Option<Range<N>> {
     let both = a.start.max(b.start)..a.end.min(b.end);
     (!both.is_empty()).then_some(both)
 }

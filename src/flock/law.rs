@@ -76,7 +76,7 @@ impl MatrixWeights {
     }
 
     /// Stiffnesses of a particle, parallel to its neighbours.
-    pub(crate) fn stiffness_of(&self, particle: usize) -> &[Block] {
+    pub fn stiffness_of(&self, particle: usize) -> &[Block] {
         &self.stiffness[self.range(particle)]
     }
 

@@ -2,7 +2,7 @@
 
 use super::body::Body;
 use super::neighbourhood::Neighbours;
-use super::vectors::distance;
+use crate::geometry::portion::Area;
 
 /// Which particles; the frame is never picked.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,20 +16,8 @@ pub enum Region {
         /// How far from that side into the body.
         depth: f64,
     },
-    /// The particles in this box, its boundary included \[length\].
-    Box {
-        /// Lowest coordinates.
-        min: [f64; 2],
-        /// Highest coordinates.
-        max: [f64; 2],
-    },
-    /// The particles in this disc, its boundary included \[length\].
-    Disc {
-        /// Centre of the disc.
-        centre: [f64; 2],
-        /// Radius of the disc.
-        radius: f64,
-    },
+    /// The particles in this box or disc.
+    In(Area),
     /// The particles with these ids.
     Ids(Vec<usize>),
     /// Every particle that lacks a neighbour: the outline of the body, holes included.
@@ -70,14 +58,7 @@ impl Region {
                     })
                     .collect()
             }
-            Region::Box { min, max } => matter
-                .filter(|&i| {
-                    (0..2).all(|k| place(i)[k] >= min[k] - tolerance && place(i)[k] <= max[k] + tolerance)
-                })
-                .collect(),
-            Region::Disc { centre, radius } => {
-                matter.filter(|&i| distance(place(i), *centre) <= radius + tolerance).collect()
-            }
+            Region::In(area) => matter.filter(|&i| area.contains(place(i), tolerance)).collect(),
             Region::Ids(ids) => matter.filter(|&i| ids.contains(&body.id(i))).collect(),
             Region::Boundary if body.outline.is_some() => {
                 let known = body.outline.iter().flat_map(|outline| outline.places.iter().enumerate());

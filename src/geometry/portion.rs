@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use super::outline::{Outline, Place};
 use super::piece::{Arc, Piece};
-use super::point::{Point, dot};
+use super::point::{Point, distance, dot};
 
 /// A stretch of one piece of an outline.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,25 +18,44 @@ pub struct Portion {
     pub t: [f64; 2],
 }
 
-/// Which parts of an outline.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Selection {
-    /// The outer loop and those of all holes.
-    All,
-    /// The parts in a box, its boundary included \[length\].
+/// A part of the plane, its boundary included \[length\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Area {
+    /// An upright rectangle; it may have no width.
     Box {
         /// Lowest coordinates.
         min: Point,
         /// Highest coordinates.
         max: Point,
     },
-    /// The parts in a disc, its boundary included \[length\].
+    /// A full disc.
     Disc {
-        /// Centre of the disc.
+        /// Coordinates of the middle.
         centre: Point,
-        /// Radius of the disc.
+        /// Distance of the rim from the middle.
         radius: f64,
     },
+}
+
+impl Area {
+    /// Whether a point lies inside or within `tolerance` \[length\] of the boundary.
+    pub fn contains(&self, point: Point, tolerance: f64) -> bool {
+        match *self {
+            Area::Box { min, max } => {
+                (0..2).all(|k| point[k] >= min[k] - tolerance && point[k] <= max[k] + tolerance)
+            }
+            Area::Disc { centre, radius } => distance(point, centre) <= radius + tolerance,
+        }
+    }
+}
+
+/// Which parts of an outline.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Selection {
+    /// The outer loop and those of all holes.
+    All,
+    /// The parts in a box or a disc.
+    In(Area),
     /// Pieces by number.
     Pieces {
         /// The loop: 0 is the outer one, then holes in their order.
@@ -92,7 +111,7 @@ impl Outline {
         };
         let mut found = match selection {
             Selection::All => within(&|_| vec![[0.0, 1.0]]),
-            Selection::Box { min, max } => within(&|piece| {
+            Selection::In(Area::Box { min, max }) => within(&|piece| {
                 let sides = [
                     ([1.0, 0.0], max[0]),
                     ([-1.0, 0.0], -min[0]),
@@ -102,7 +121,7 @@ impl Outline {
                 let within = |(normal, offset)| cut_at(grain, |grown| below(piece, normal, offset + grown));
                 sides.map(within).into_iter().fold(vec![[0.0, 1.0]], |kept, side| common(&kept, &side))
             }),
-            Selection::Disc { centre, radius } => {
+            Selection::In(Area::Disc { centre, radius }) => {
                 within(&|piece| cut_at(grain, |grown| within_disc(piece, *centre, (radius + grown).max(0.0))))
             }
             Selection::Pieces { ring, pieces, angles } => {
@@ -261,20 +280,20 @@ mod tests {
         let outline = plate();
         let all = 12.0 + TAU * 0.5;
         assert!((length(&outline, &Selection::All) - all).abs() < 1e-12);
-        let right = Selection::Box { min: [4.0, 0.5], max: [4.0, 2.0] };
+        let right = Selection::In(Area::Box { min: [4.0, 0.5], max: [4.0, 2.0] });
         assert!((length(&outline, &right) - 1.5).abs() < 1e-12);
-        let half = Selection::Box { min: [2.0, 0.25], max: [3.0, 1.75] };
+        let half = Selection::In(Area::Box { min: [2.0, 0.25], max: [3.0, 1.75] });
         assert!((length(&outline, &half) - TAU * 0.25).abs() < 1e-12, "half of the hole");
-        let disc = Selection::Disc { centre: [0.0, 0.0], radius: 1.0 };
+        let disc = Selection::In(Area::Disc { centre: [0.0, 0.0], radius: 1.0 });
         assert!((length(&outline, &disc) - 2.0).abs() < 1e-12);
         // A circle through the centre of the hole's circle, of the same radius, has a third of it inside.
-        let lens = Selection::Disc { centre: [2.5, 1.0], radius: 0.5 };
+        let lens = Selection::In(Area::Disc { centre: [2.5, 1.0], radius: 0.5 });
         assert!((length(&outline, &lens) - TAU * 0.5 / 3.0).abs() < 1e-12);
         // An edge that only touches the hole takes in none of it or all of it, though rounding moves the edge.
         for off in [-1e-12, 0.0, 1e-12] {
-            let beside = Selection::Box { min: [1.0, 1.5 + off], max: [3.0, 1.9] };
+            let beside = Selection::In(Area::Box { min: [1.0, 1.5 + off], max: [3.0, 1.9] });
             assert_eq!(outline.portions(&beside, 1e-9), []);
-            let around = Selection::Box { min: [1.0, 0.1], max: [3.0, 1.5 + off] };
+            let around = Selection::In(Area::Box { min: [1.0, 0.1], max: [3.0, 1.5 + off] });
             assert!((length(&outline, &around) - TAU * 0.5).abs() < 1e-12);
         }
     }

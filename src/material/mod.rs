@@ -42,8 +42,8 @@
 //! \[force / length\].
 //!
 //! ```
-//! use flockform::flock::{body::{Body, Cut}, lattice::{Lattice, LatticeKind}};
-//! use flockform::material::{cells::Cells, elastic::{Constants, Elastic, Plane}, weights::MaterialWeights};
+//! use flockform::flock::{body::{Body, Cut}, lattice::{Lattice, LatticeKind}, rules::Rotation};
+//! use flockform::material::{cells::Cells, elastic::{Constants, Elastic, Plane}, weights};
 //!
 //! let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0, 0.0], 0.0);
 //! let cut = Cut::Count { columns: 5, rows: 5 };
@@ -51,8 +51,9 @@
 //! let (body, neighbours) = Body::build(lattice, &cut, &neighbourhood, None)?;
 //! let steel = Constants::Isotropic { young: 210e9, poisson: 0.3, plane: Plane::Stress };
 //! let cells = Cells::of_body(&body);
-//! let weights = MaterialWeights::assemble(&cells, &body, neighbours, &Elastic::new(steel, 1e-3)?)?;
-//! assert_eq!(weights.neighbours.of(12).len(), 8);
+//! let steel = Elastic::new(steel, 1e-3)?;
+//! let weights = weights::assemble(&cells, &body, &neighbours, &steel, Rotation::Small)?;
+//! assert_eq!(weights.of(12).len(), 8);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

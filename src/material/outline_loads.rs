@@ -279,7 +279,7 @@ mod tests {
     use crate::flock::lattice::{Lattice, LatticeKind};
     use crate::flock::outlay::Outlay;
     use crate::geometry::point::area;
-    use crate::geometry::portion::Selection;
+    use crate::geometry::portion::{Area, Selection};
     use crate::geometry::shape::Shape;
     use crate::material::cells::{neighbourhood, templates};
     use crate::material::fit::fit;
@@ -334,7 +334,7 @@ mod tests {
                 let expected = [2.0 * length, -3.0 * length, -3.0 * length * 8.5 - 2.0 * length * 4.0];
                 let off = [found.force[0], found.force[1], found.moment];
                 assert!((0..3).all(|k| (off[k] - expected[k]).abs() < 1e-11 * 300.0), "{label}: {found:?}");
-                let part = Selection::Box { min: [1.0, 2.5], max: [20.0, 5.5] };
+                let part = Selection::In(Area::Box { min: [1.0, 2.5], max: [20.0, 5.5] });
                 let found = add(part, Push::Traction([1.0, 0.0]), None);
                 // Both the edge and the hole lie in the box.
                 let hole = 2.0 * (1.5f64 / 1.7).asin() * 2.0 * 1.7;

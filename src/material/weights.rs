@@ -4,45 +4,17 @@ mod assembly;
 
 use rayon::prelude::*;
 
-use assembly::Assembly;
+use assembly::{Assembly, Row};
 
 use super::cells::Cells;
 use super::elastic::Elastic;
 use super::mechanism::{Mechanism, require_rigid};
 use super::stiffness::ShapeError;
-use crate::flock::block::{Block, apply, product};
+use crate::flock::block::{Block, product};
 use crate::flock::body::Body;
-use crate::flock::cells_around::CellsAround;
 use crate::flock::law::MatrixWeights;
 use crate::flock::neighbourhood::Neighbours;
-use crate::flock::vectors::Vectors;
-
-/// The material as seen by each particle. A row depends only on the cells around its particle, so
-/// particles fall into a few classes that share one; particles of a frame have neither cells nor
-/// weights.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MaterialWeights {
-    /// The neighbours of each particle, in the order in which they were given: the order of summation.
-    pub neighbours: Neighbours,
-    /// Class of each particle, shape \[count\].
-    pub class: Vec<u32>,
-    /// One row for each class, shape \[classes\].
-    pub rows: Vec<Row>,
-    /// The cells around the particles of each class.
-    pub cells: CellsAround,
-}
-
-/// The stiffness felt by the particles of a class.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Row {
-    /// `K_ij` \[force / length\] in the order of the particle's neighbours. Zero between neighbours that
-    /// share no cell. `K_ji` is the transpose of `K_ij`, to the bit.
-    pub blocks: Vec<Block>,
-    /// `D_i = sum_j K_ij` \[force / length\].
-    pub diagonal: Block,
-    /// `D_i^-1` \[length / force\].
-    pub inverse: Block,
-}
+use crate::flock::rules::Rotation;
 
 /// Why cells and neighbours make no material rule. Particles are named by their ids, which count from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -115,87 +87,54 @@ impl WeightsError {
     }
 }
 
-impl MaterialWeights {
-    /// Weights of a body cut from a lattice: one material throughout.
-    ///
-    /// `neighbours` are those the body was built with (see [`super::cells::neighbourhood`] for the
-    /// fewest that will do); every particle that shares a cell must be among them. Refuses a body
-    /// that its cells do not hold together; of a part of one that is for all parts to find out.
-    pub fn assemble(
-        cells: &Cells,
-        body: &Body,
-        neighbours: Neighbours,
-        elastic: &Elastic,
-    ) -> Result<Self, WeightsError> {
-        let incidence = cells.incidence(body.count());
-        if body.part.is_none() {
-            require_rigid(cells, &incidence, &body.reference, |i| !body.is_frame[i])?;
-        }
-        let index = |i: usize| body.index(i);
-        let assembly = Assembly::new((cells, &incidence), &neighbours, elastic, &index)?;
-        let (class, first) = assembly.classes();
-        // Every row is summed over its own cells in their order: the same bits on any number of threads.
-        // Collected before looking: the first error in the order of particles, not the first to be found.
-        let rows: Vec<Result<Row, WeightsError>> = first.par_iter().map(|&i| assembly.row(i)).collect();
-        let rows = rows.into_iter().collect::<Result<_, _>>()?;
-        let cells = assembly.cells_around(&first);
-        Ok(Self { neighbours, class, rows, cells })
+/// The weights `W_ij = D_i^-1 K_ij` \[1\] of a body cut from a lattice, one material throughout: those of one particle
+/// sum to the identity, those of a corotated rule come with the cells around each particle. A row depends
+/// only on these cells, so particles fall into a few classes that share one; particles of a frame have
+/// neither cells nor weights.
+///
+/// `neighbours` are those the body was built with (see [`super::cells::neighbourhood`] for the
+/// fewest that will do); every particle that shares a cell must be among them. Between those that share none
+/// `K_ij` is zero; `K_ji` is its transpose, to the bit.
+///
+/// # Errors
+/// A body that its cells do not hold together, of a part of which all parts find it out together; cells that
+/// the neighbours or the material do not fit.
+pub fn assemble(
+    cells: &Cells,
+    body: &Body,
+    neighbours: &Neighbours,
+    elastic: &Elastic,
+    rotation: Rotation,
+) -> Result<MatrixWeights, WeightsError> {
+    let incidence = cells.incidence(body.count());
+    if body.part.is_none() {
+        require_rigid(cells, &incidence, &body.reference, |i| !body.is_frame[i])?;
     }
-
-    /// The row of a particle.
-    pub fn of(&self, particle: usize) -> &Row {
-        &self.rows[self.class[particle] as usize]
+    let index = |i: usize| body.index(i);
+    let assembly = Assembly::new((cells, &incidence), neighbours, elastic, &index)?;
+    let (class, first) = assembly.classes();
+    // Every row is summed over its own cells in their order: the same bits on any number of threads.
+    // Collected before looking: the first error in the order of particles, not the first to be found.
+    let rows: Vec<Result<Row, WeightsError>> = first.par_iter().map(|&i| assembly.row(i)).collect();
+    let around = || Box::new(assembly.cells_around(&first));
+    let mut weights = MatrixWeights {
+        class,
+        starts: vec![0],
+        blocks: Vec::new(),
+        stiffness: Vec::new(),
+        compliance: Vec::with_capacity(rows.len()),
+        cells: None,
+    };
+    for row in rows {
+        let (stiffness, compliance) = row?;
+        weights.blocks.extend(stiffness.iter().map(|block| product(&compliance, block)));
+        weights.stiffness.extend(stiffness);
+        weights.compliance.push(compliance);
+        weights.starts.push(weights.blocks.len() as u32);
     }
-
-    /// Bonds of a particle: the neighbour and `K_ij` \[force / length\].
-    pub fn bonds(&self, particle: usize) -> impl Iterator<Item = (usize, &Block)> {
-        let seen = self.neighbours.of(particle).iter().map(|&j| j as usize);
-        seen.zip(&self.of(particle).blocks)
-    }
-
-    /// The weights `W_ij = D_i^-1 K_ij` \[1\] as the rule applies them; those of one particle sum to the
-    /// identity.
-    pub fn weights(&self) -> MatrixWeights {
-        let mut weights = MatrixWeights {
-            class: self.class.clone(),
-            starts: vec![0],
-            blocks: Vec::new(),
-            stiffness: Vec::new(),
-            compliance: self.rows.iter().map(|row| row.inverse).collect(),
-            cells: None,
-        };
-        for row in &self.rows {
-            weights.blocks.extend(row.blocks.iter().map(|block| product(&row.inverse, block)));
-            weights.stiffness.extend(&row.blocks);
-            weights.starts.push(weights.blocks.len() as u32);
-        }
-        weights
-    }
-
-    /// The weights of a corotated rule: those of [`MaterialWeights::weights`] and the cells around each particle.
-    pub fn corotated_weights(&self) -> MatrixWeights {
-        MatrixWeights { cells: Some(Box::new(self.cells.clone())), ..self.weights() }
-    }
-
-    /// Force of the neighbours on a particle, `sum_j K_ij (u_j - u_i)` \[force\], under displacements
-    /// \[length\]: zero to the last bit if all move alike.
-    pub fn force(&self, particle: usize, displacement: &Vectors) -> [f64; 2] {
-        let here = displacement.get(particle);
-        self.bonds(particle).fold([0.0; 2], |sum, (j, block)| {
-            let there = displacement.get(j);
-            let [x, y] = apply(block, [there[0] - here[0], there[1] - here[1]]);
-            [sum[0] + x, sum[1] + y]
-        })
-    }
-
-    /// Strain energy \[force length\] under displacements \[length\].
-    pub fn energy(&self, displacement: &Vectors) -> f64 {
-        let work = |i: usize| {
-            let ([fx, fy], [x, y]) = (self.force(i, displacement), displacement.get(i));
-            fx * x + fy * y
-        };
-        -0.5 * (0..self.class.len()).map(work).sum::<f64>()
-    }
+    // After the rows: where they stand, each corner of a cell is among the neighbours.
+    weights.cells = (rotation == Rotation::Corotated).then(around);
+    Ok(weights)
 }
 
 /// Those that one of `particles` particles feels, in order of index, and `K_ij` \[force / length\].
@@ -205,6 +144,6 @@ pub(super) fn bonds_of(
     elastic: &Elastic,
 ) -> Result<Vec<(u32, Block)>, WeightsError> {
     let (incidence, neighbours) = (cells.incidence(particles), cells.neighbours(particles, elastic));
-    let row = Assembly::new((cells, &incidence), &neighbours, elastic, &|i| i)?.row(particle)?;
-    Ok(neighbours.of(particle).iter().copied().zip(row.blocks).collect())
+    let (blocks, _) = Assembly::new((cells, &incidence), &neighbours, elastic, &|i| i)?.row(particle)?;
+    Ok(neighbours.of(particle).iter().copied().zip(blocks).collect())
 }

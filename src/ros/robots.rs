@@ -277,23 +277,19 @@ impl RobotNodes {
         true
     }
 
-    /// Lets peers read and set the level of this log, where the swarm file asks for that.
+    /// As [`FormationNode::share_log`](super::node::FormationNode::share_log), in the name of the first node.
     ///
     /// # Errors
-    /// A service that the middleware refuses.
-    pub fn serve_log_level(&mut self, level: LogLevel) -> Result<(), EdgeError> {
-        if self.link.has_loggers {
-            self.link.loggers = Some(Loggers::new(&self.link.nodes[0], level)?);
-        }
-        Ok(())
-    }
-
-    /// Publishes these lines of the log, in the name of the first node.
-    ///
-    /// # Errors
-    /// A topic that the middleware refuses.
-    pub fn publish_log(&mut self, lines: Receiver<Log>) -> Result<(), EdgeError> {
-        self.rosout = Some(Rosout::new(&self.link.nodes[0], lines)?);
+    /// A service or a topic that the middleware refuses.
+    pub fn share_log(
+        &mut self,
+        level: Option<LogLevel>,
+        lines: Option<Receiver<Log>>,
+    ) -> Result<(), EdgeError> {
+        let link = &mut self.link;
+        let level = level.filter(|_| link.has_loggers);
+        link.loggers = level.map(|level| Loggers::new(&link.nodes[0], level)).transpose()?;
+        self.rosout = lines.map(|lines| Rosout::new(&link.nodes[0], lines)).transpose()?;
         Ok(())
     }
 

@@ -122,27 +122,12 @@ impl<'a> Way<'a> {
 }
 
 /// The equilibrium at the end of the way. `held_axes` are single components of followers that are held, shape
-/// \[count\]\[x, y\], or empty; the way says where they are as well.
+/// \[count\]\[x, y\], or empty; the way says where they are as well. Of a body of which each rank of the team has a part, and
+/// that is all that is given here, all find the same, or fail alike.
 ///
 /// # Errors
 /// As [`solve_shared`](super::equilibrium::solve_shared); names the part of the way from which on the rotations do not settle.
 pub fn solve(
-    flock: &Flock,
-    body: &Body,
-    follows: Vec<bool>,
-    held_axes: Vec<[bool; 2]>,
-    way: &Way<'_>,
-    request: &Request,
-) -> Result<Solved, CorotatedError> {
-    solve_in_parts((flock, body), follows, held_axes, way, request, None)
-}
-
-/// The same of a body of which each rank of the team has a part, and that is all that is given here; all find the same, or fail
-/// alike.
-///
-/// # Errors
-/// As [`solve`].
-pub fn solve_in_parts(
     (flock, body): (&Flock, &Body),
     follows: Vec<bool>,
     held_axes: Vec<[bool; 2]>,

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use super::field::Real;
 use super::operator::Columns;
-use crate::flock::halo::{put, words, words_per_particle};
+use crate::flock::halo::{Halo, meet, put, words, words_per_particle};
 use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
 
@@ -80,30 +80,21 @@ pub fn of_each(team: &Team, own: Range<usize>) -> Vec<Range<usize>> {
 }
 
 /// Has words of particles travel from the ranks that own them to others that want them: `read` the words of some of those here,
-/// `count` how many they are, and `write` those that arrive. All are numbered as in the whole. Returns those that this rank owns
-/// and wants.
+/// `count` how many they are, and `write` those that arrive. All are numbered as in the whole.
 fn exchanged(
     team: &Team,
     (owned, wanted): (&[Range<usize>], &[Range<usize>]),
     read: impl Fn(Range<usize>) -> Vec<u64>,
     count: impl Fn(usize) -> usize,
     mut write: impl FnMut(Range<usize>, &[u64]),
-) -> Range<usize> {
-    let rank = team.rank();
-    let both = |owner: usize, reader: usize| {
-        let (a, b) = (&owned[owner], &wanted[reader]);
-        let start = a.start.max(b.start);
-        start..a.end.min(b.end).max(start)
-    };
-    let others = || (0..team.count()).filter(|&other| other != rank);
-    let some = |of: Range<usize>| Some(of).filter(|of| !of.is_empty());
-    let sent: Vec<_> = others().filter_map(|other| Some((other, read(some(both(rank, other))?)))).collect();
-    let from: Vec<_> = others().filter_map(|other| Some((other, some(both(other, rank))?))).collect();
-    let sizes: Vec<_> = from.iter().map(|(other, of)| (*other, count(of.len()))).collect();
-    for ((_, of), words) in from.into_iter().zip(team.swap(&sent, &sizes)) {
+) {
+    let ranks = (team.rank(), team.count());
+    let Halo { sends, receives } = Halo::new(ranks, |of| owned[of].clone(), |of| wanted[of].clone());
+    let sent: Vec<_> = sends.into_iter().map(|(other, of)| (other, read(of))).collect();
+    let sizes: Vec<_> = receives.iter().map(|(other, of)| (*other, count(of.len()))).collect();
+    for ((_, of), words) in receives.into_iter().zip(team.swap(&sent, &sizes)) {
         write(of, &words);
     }
-    both(rank, rank)
 }
 
 /// The vector over the particles that this rank wants, of one that begins with the `first` particle of the whole.
@@ -114,14 +105,14 @@ pub fn moved<T: Real>(
 ) -> Vectors<T> {
     let to_first = wanted[team.rank()].start;
     let mut to = Vectors::zeros(wanted[team.rank()].len());
-    let own = exchanged(
+    exchanged(
         team,
         (owned, wanted),
         |of| words(from, &(of.start - first..of.end - first)),
         |count| words_per_particle::<T>() * count,
         |of, words| put(&mut to, &(of.start - to_first..of.end - to_first), words),
     );
-    if !own.is_empty() {
+    if let Some(own) = meet(&owned[team.rank()], &wanted[team.rank()]) {
         let (read, write) = (own.start - first..own.end - first, own.start - to_first..own.end - to_first);
         to.x[write.clone()].copy_from_slice(&from.x[read.clone()]);
         to.y[write].copy_from_slice(&from.y[read]);

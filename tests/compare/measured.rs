@@ -1,11 +1,12 @@
 //! The measures are zero for equal fields and known for fields that differ in a known way.
 
-use flockform::flock::rules::Rotation;
+use flockform::flock::law::{Flock, Weights};
+use flockform::flock::rules::{Mean, Rotation, Rule};
 use flockform::flock::vectors::Vectors;
 use flockform::material::cells::Cells;
 use flockform::material::elastic::Plane;
 use flockform::material::stress::strain_energy;
-use flockform::material::weights::MaterialWeights;
+use flockform::material::weights::assemble;
 use flockform::study::compare::measures::{Comparison, Sides, von_mises};
 
 use crate::support::*;
@@ -84,10 +85,18 @@ fn the_energy_is_that_of_the_material_weights() {
         let (body, cells) = sample(kind);
         let elastic = fibres();
         let cell_neighbours = cells.cell_neighbours(body.count());
-        let weights = MaterialWeights::assemble(&cells, &body, cell_neighbours, &elastic).expect("assembles");
+        let weights = assemble(&cells, &body, &cell_neighbours, &elastic, Rotation::Small);
+        let weights = Weights::Matrix(weights.expect("assembles"));
+        let rule = Rule { mean: Mean::Material { rotation: Rotation::Small }, ..Rule::BARYCENTRE };
+        let felt = Flock::new(rule, body.reference.clone(), cell_neighbours, weights);
         let field = bent(&body.reference);
         let energy = strain_energy(&cells, &elastic, &field, Rotation::Small).expect("has stiffness");
-        assert!((energy / weights.energy(&field) - 1.0).abs() < 1e-11, "{kind:?}");
+        let work = |i: usize| {
+            let ([fx, fy], [x, y]) = (felt.force_under(i, &field), field.get(i));
+            fx * x + fy * y
+        };
+        let of_weights = -0.5 * (0..body.count()).map(work).sum::<f64>();
+        assert!((energy / of_weights - 1.0).abs() < 1e-11, "{kind:?}");
     }
 }
 

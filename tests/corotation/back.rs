@@ -25,7 +25,7 @@ fn in_increments(beam: &Beam, held: &(dyn Fn(f64) -> Vectors + Sync), count: u32
         let end = f64::from(k) / f64::from(count);
         let way = Way { held, start: all.last().map(|solved| (&solved.displacement, last)), end };
         let (follows, axes) = (beam.follows.clone(), beam.held_axes.clone());
-        let solved = corotated::solve(&beam.flock, &beam.body, follows, axes, &way, &request);
+        let solved = corotated::solve((&beam.flock, &beam.body), follows, axes, &way, &request, None);
         let solved = solved.unwrap_or_else(|error| panic!("{k} of {count}: {error}"));
         all.push(solved);
         last = end;
@@ -104,7 +104,8 @@ fn a_bar_turned_once_around_at_one_end_is_not_at_rest_where_it_began() {
             bar.body.reference.iter().map(by).collect()
         };
         let (follows, axes) = (bar.follows.clone(), bar.held_axes.clone());
-        corotated::solve(&bar.flock, &bar.body, follows, axes, &Way::whole(&held), &Request::default())
+        let way = Way::whole(&held);
+        corotated::solve((&bar.flock, &bar.body), follows, axes, &way, &Request::default(), None)
     };
     for turns in [1.0, -2.0, 11.0, 350.0 / 360.0] {
         let reached = match solved(turns) {

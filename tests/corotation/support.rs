@@ -9,7 +9,7 @@ use flockform::geometry::outline::Outline;
 use flockform::geometry::shape::Shape;
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::material::fit::fit;
-use flockform::material::weights::MaterialWeights;
+use flockform::material::weights::assemble;
 use flockform::solve::corotated::{self, CorotatedError};
 use flockform::solve::equilibrium::{Choice, Request, Solved, Solver};
 
@@ -59,12 +59,12 @@ impl Beam {
         let end = sides.filter(|&[a, b]| at(length, a) && at(length, b));
         let forces = tractions::forces(&body.reference, end.map(|side| (side, [load; 2])));
         let near = cells.neighbours(body.count(), elastic);
-        let weights = MaterialWeights::assemble(&cells, &body, near, elastic).expect("holds");
+        let weights = assemble(&cells, &body, &near, elastic, Rotation::Corotated).expect("holds");
         let flock = Flock {
             rule: Rule { mean: Mean::Material { rotation: Rotation::Corotated }, ..Rule::BARYCENTRE },
             reference: body.reference.clone(),
-            neighbours: weights.neighbours.clone(),
-            weights: Weights::Matrix(weights.corotated_weights()),
+            neighbours: near,
+            weights: Weights::Matrix(weights),
             forces: Some(forces),
             rest: None,
             keeps_rest: false,
@@ -101,12 +101,12 @@ impl Beam {
         let way = |_: f64| Vectors::zeros(self.body.count());
         let request = Request { solver: Choice::This(solver), tolerance: 1e-12, ..Request::default() };
         corotated::solve(
-            &self.flock,
-            &self.body,
+            (&self.flock, &self.body),
             self.follows.clone(),
             self.held_axes.clone(),
             &corotated::Way::whole(&way),
             &request,
+            None,
         )
     }
 

@@ -1,13 +1,14 @@
 //! Bodies on all lattices, as systems to be solved.
 
-use flockform::flock::block::Block;
+use flockform::flock::block::{Block, plus};
 use flockform::flock::body::{Body, Cut};
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::neighbourhood::{Neighbourhood, Neighbours};
+use flockform::flock::rules::Rotation;
 use flockform::flock::vectors::Vectors;
 use flockform::material::cells::{Cells, neighbourhood};
 use flockform::material::elastic::{Constants, Elastic, Plane};
-use flockform::material::weights::MaterialWeights;
+use flockform::material::weights::assemble;
 use flockform::solve::equilibrium::{Choice, Request, Solved, Solver, System, solve};
 use flockform::solve::operator::{Operator, Row};
 
@@ -101,10 +102,12 @@ pub fn operator(body: &Body, neighbours: Neighbours, feel: Feel, held: impl Fn(u
             let steel = Constants::Isotropic { young: 1000.0, poisson: 0.33, plane: Plane::Stress };
             let elastic = Elastic::new(steel, 1.0).expect("admissible");
             let cells = Cells::of_body(body);
-            let weights = MaterialWeights::assemble(&cells, body, neighbours, &elastic).expect("holds");
+            let weights = assemble(&cells, body, &neighbours, &elastic, Rotation::Small).expect("holds");
             Box::new(move |i| {
-                let entry = |(j, block): (usize, &Block)| (offset(i, j as u32), *block);
-                Row { diagonal: weights.of(i).diagonal, entries: weights.bonds(i).map(entry).collect() }
+                let blocks = weights.stiffness_of(i);
+                let diagonal = blocks.iter().fold(Block::default(), |sum, block| plus(&sum, block));
+                let seen = neighbours.of(i).iter().map(|&j| offset(i, j));
+                Row { diagonal, entries: seen.zip(blocks.iter().copied()).collect() }
             })
         }
     };

@@ -2,11 +2,11 @@
 //! solution states is the error that it has.
 
 use flockform::fem::{
-    Effort, FemError, Holding, Material, Orthotropic, Plane, PlaneRegion, ShapeProblem, ShapeSolution,
-    Strain, Support, solve_shape,
+    Effort, FemError, Holding, Material, Orthotropic, Plane, ShapeProblem, ShapeSolution, Strain, Support,
+    solve_shape,
 };
 use flockform::geometry::outline::Outline;
-use flockform::geometry::portion::{Portion, Selection};
+use flockform::geometry::portion::{Area, Portion, Selection};
 use flockform::geometry::shape::Shape;
 
 pub type Point = [f64; 2];
@@ -296,7 +296,7 @@ fn the_stated_error_holds_for_supports_and_loads_of_all_kinds() {
     });
     let mut problem = ShapeProblem::new(&plate, material);
     let region = |on, components| Support { on, components, displacement: Box::new(|_| [0.0; 2]), way: None };
-    let corner = PlaneRegion::Box { min: [-1.0, -1.0], max: [2.0, 3.0] };
+    let corner = Area::Box { min: [-1.0, -1.0], max: [2.0, 3.0] };
     problem.supports.push(region(Holding::Region(corner), [true; 2]));
     problem.supports.push(region(
         Holding::Portions(portions(&plate, &Selection::Between { from: [3.0, 8.0], to: [5.0, 8.0] })),
@@ -309,7 +309,7 @@ fn the_stated_error_holds_for_supports_and_loads_of_all_kinds() {
 
     let disc = outline(&Shape::Disc { centre: [0.0; 2], radius: 5.0 });
     let mut problem = ShapeProblem::new(&disc, material);
-    let held = PlaneRegion::Disc { centre: [-2.0, 0.0], radius: 1.0 };
+    let held = Area::Disc { centre: [-2.0, 0.0], radius: 1.0 };
     problem.supports.push(region(Holding::Region(held), [true; 2]));
     let led = Holding::Segment([[2.0, -1.0], [3.0, 1.0]]);
     problem.supports.push(Support {
@@ -372,7 +372,7 @@ fn bodies_that_are_not_held_and_supports_beside_them_are_refused_by_name() {
     assert!(matches!(solve(&problem), Err(FemError::Mechanism { motion: "translate along x", .. })));
     problem.supports.push(hold_at([0.0, 0.0], [true; 2], |_| [0.0; 2]));
     assert!(matches!(solve(&problem), Err(FemError::Mechanism { motion: "rotate", .. })));
-    let far = PlaneRegion::Disc { centre: [9.0, 9.0], radius: 1.0 };
+    let far = Area::Disc { centre: [9.0, 9.0], radius: 1.0 };
     problem.supports.push(Support {
         on: Holding::Region(far),
         components: [true; 2],

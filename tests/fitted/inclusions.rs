@@ -9,10 +9,9 @@ use flockform::geometry::point::area;
 use flockform::geometry::shape::Shape;
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::material::fit::{FitError, Fitted, LEAST_AREA, LEAST_SIDE, LEAST_WIDTH, fit_regions};
-use flockform::material::weights::MaterialWeights;
 use nalgebra::{Matrix2, Vector2};
 
-use crate::outlines::{KINDS, Noise};
+use crate::outlines::{KINDS, Noise, felt};
 use crate::scenes::load;
 use crate::support::{KINDS as SCENE_KINDS, error, lattice, on_right_edge, scene, solved};
 
@@ -122,9 +121,7 @@ fn two_materials_that_meet_along_any_line_carry_uniform_stresses_on_every_lattic
         fits += 1;
         let Fitted { body, mut cells } = fitted;
         cells.inclusions = vec![pair[1]];
-        let weights =
-            MaterialWeights::assemble(&cells, &body, cells.neighbours(body.count(), &pair[0]), &pair[0])
-                .expect("holds together");
+        let felt = felt(&body, &cells, cells.neighbours(body.count(), &pair[0]), &pair[0]);
         let place = |p: [f64; 2]| {
             let p = Vector2::from(p);
             let beyond = (p.dot(&normal) - off).max(0.0);
@@ -135,7 +132,7 @@ fn two_materials_that_meet_along_any_line_carry_uniform_stresses_on_every_lattic
         let mut on_edge = vec![false; body.count()];
         cells.boundary_sides(&incidence).iter().flatten().for_each(|&i| on_edge[i as usize] = true);
         let inside = (0..body.count()).filter(|&i| !on_edge[i]);
-        let left = inside.map(|i| weights.force(i, &moved)).map(|[x, y]| x.hypot(y)).fold(0.0, f64::max);
+        let left = inside.map(|i| felt.force_under(i, &moved)).map(|[x, y]| x.hypot(y)).fold(0.0, f64::max);
         assert!(left < 1e-9, "{label}: {left:e} is left inside");
     }
     assert!(fits > 40, "{fits} of 54");

@@ -1,8 +1,11 @@
 //! Any polygon with a hole, on any lattice in any direction: areas, resultants, uniform strains, quality.
 
-use flockform::flock::body::Cut;
+use flockform::flock::body::{Body, Cut};
 use flockform::flock::lattice::{Lattice, LatticeKind};
+use flockform::flock::law::{Flock, Weights};
+use flockform::flock::neighbourhood::Neighbours;
 use flockform::flock::outlay::Outlay;
+use flockform::flock::rules::{Mean, Rotation, Rule};
 use flockform::flock::vectors::Vectors;
 use flockform::geometry::outline::Outline;
 use flockform::geometry::point::area;
@@ -13,7 +16,7 @@ use flockform::material::cells::{Cells, neighbourhood, templates};
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::material::fit::{Fitted, LEAST_AREA, LEAST_SIDE, LEAST_WIDTH, fit};
 use flockform::material::outline_loads::{Load, Loader, OutlineLoad, Push, Resultant};
-use flockform::material::weights::MaterialWeights;
+use flockform::material::weights::assemble;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -68,6 +71,13 @@ fn five_hundred_polygons_with_holes_pass_the_patch_test_on_each_lattice_with_exa
     });
 }
 
+/// A body as its particles feel its material.
+pub fn felt(body: &Body, cells: &Cells, neighbours: Neighbours, elastic: &Elastic) -> Flock {
+    let weights = assemble(cells, body, &neighbours, elastic, Rotation::Small).expect("holds together");
+    let rule = Rule { mean: Mean::Material { rotation: Rotation::Small }, ..Rule::BARYCENTRE };
+    Flock::new(rule, body.reference.clone(), neighbours, Weights::Matrix(weights))
+}
+
 /// The largest force that a uniform stress leaves on a particle of a random polygon with a hole, in stress times spacing
 /// times thickness: the force that the stress puts on the side of a cell, of which a particle's forces are the sum.
 fn left_of_uniform_stress(noise: &mut Noise, kind: LatticeKind, round: usize) -> f64 {
@@ -110,10 +120,10 @@ fn left_of_uniform_stress(noise: &mut Noise, kind: LatticeKind, round: usize) ->
         }
     }
     let near = cells.cell_neighbours(body.count());
-    let weights = MaterialWeights::assemble(&cells, &body, near, &elastic).expect("holds together");
+    let felt = felt(&body, &cells, near, &elastic);
     let moved: Vectors = body.reference.iter().map(affine).collect();
     let left = |i: usize| {
-        let (pull, load) = (weights.force(i, &moved), loads.get(i));
+        let (pull, load) = (felt.force_under(i, &moved), loads.get(i));
         (pull[0] + load[0]).hypot(pull[1] + load[1])
     };
     let worst = (0..body.count()).map(left).fold(0.0, f64::max) / (largest * body.lattice.spacing());

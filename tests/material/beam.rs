@@ -1,13 +1,12 @@
 //! The paper's beam against the truth in the reference files.
 
 use flockform::flock::body::{Body, Cut};
-use flockform::flock::cells_around::CellsAround;
 use flockform::flock::lattice::Lattice;
+use flockform::flock::law::MatrixWeights;
 use flockform::flock::neighbourhood::{Neighbourhood, Neighbours};
 use flockform::flock::vectors::Vectors;
 use flockform::material::cells::Cells;
 use flockform::material::elastic::Elastic;
-use flockform::material::weights::{MaterialWeights, Row};
 
 use crate::reference::beam_displacements;
 use crate::support::*;
@@ -82,14 +81,17 @@ fn the_barycentre_on_the_beam_has_the_errors_of_the_paper() {
             .expect("builds");
     let one = [[1.0, 0.0], [0.0, 1.0]];
     let scaled = |by: f64| one.map(|row| row.map(|x| by * x));
-    let row = |i: usize| {
-        let degree = neighbours.of(i).len();
-        let (diagonal, inverse) = (scaled(degree as f64), scaled(1.0 / degree as f64));
-        Row { blocks: vec![one; degree], diagonal, inverse }
+    let shares: Vec<_> = (0..body.count()).map(|i| scaled(1.0 / neighbours.of(i).len() as f64)).collect();
+    let share_of_each = |i: usize| vec![shares[i]; neighbours.of(i).len()];
+    let weights = MatrixWeights {
+        class: (0..body.count() as u32).collect(),
+        starts: neighbours.starts.clone(),
+        blocks: (0..body.count()).flat_map(share_of_each).collect(),
+        stiffness: vec![one; neighbours.index.len()],
+        compliance: shares.clone(),
+        cells: None,
     };
-    let rows = (0..body.count()).map(row).collect();
-    let class = (0..body.count() as u32).collect();
-    let weights = MaterialWeights { class, rows, neighbours, cells: CellsAround::default() };
+    let weights = MaterialWeights { neighbours, weights };
     let leads = end_columns(&body);
     let found = equilibrium(&weights, &leads, &Vectors::zeros(body.count()), &truth);
     let displacement = relative_l2(&found, &truth, |i| !leads[i]);

@@ -7,7 +7,6 @@ use flockform::flock::body::Cut;
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::vectors::Vectors;
 use flockform::geometry::shape::Shape;
-use flockform::material::weights::MaterialWeights;
 
 use crate::support::*;
 use crate::tractions;

@@ -7,7 +7,6 @@ use flockform::flock::body::Cut;
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::vectors::{Vectors, distance};
 use flockform::material::cells::neighbourhood;
-use flockform::material::weights::MaterialWeights;
 
 use crate::support::*;
 use crate::tractions;
@@ -111,7 +110,7 @@ fn weights_sum_to_the_identity_and_forces_come_in_equal_and_opposite_pairs() {
     for kind in KINDS {
         let (body, neighbours, cells) = sample(kind, 0.3);
         let weights = MaterialWeights::assemble(&cells, &body, neighbours, &fibres()).expect("assembles");
-        let as_applied = weights.weights();
+        let as_applied = &weights.weights;
         for i in 0..body.count() {
             let mut sum: Block = [[0.0; 2]; 2];
             for ((j, &block), w) in weights.bonds(i).zip(as_applied.of(i)) {
@@ -154,7 +153,7 @@ fn weights_are_the_same_at_any_spacing() {
         let lattice = Lattice::new(kind(scale), [0.0; 2], 0.3);
         let cut = Cut::Count { columns: 4, rows: 4 };
         let (body, neighbours, cells) = of_whole_cells(&lattice, &cut, &neighbourhood(&lattice));
-        MaterialWeights::assemble(&cells, &body, neighbours, &fibres()).expect("assembles").weights().blocks
+        MaterialWeights::assemble(&cells, &body, neighbours, &fibres()).expect("assembles").weights.blocks
     };
     for kind in
         [|s| LatticeKind::Rectangular { a: s, b: 1000.0 * s }, |s| LatticeKind::Honeycomb { spacing: s }]

@@ -7,7 +7,7 @@ use flockform::flock::vectors::Vectors;
 use flockform::geometry::shape::Shape;
 use flockform::material::cells::{Cells, neighbourhood};
 use flockform::material::mechanism::Mechanism;
-use flockform::material::weights::{MaterialWeights, WeightsError};
+use flockform::material::weights::WeightsError;
 
 use crate::support::*;
 

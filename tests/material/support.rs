@@ -1,15 +1,15 @@
 //! Bodies, materials and a direct solver, shared by the tests of the material rule.
 
+use flockform::flock::block::{Block, apply, plus};
 use flockform::flock::body::{Body, Cut};
 use flockform::flock::lattice::{Lattice, LatticeKind};
-use flockform::flock::law::{Flock, Weights};
+use flockform::flock::law::{Flock, MatrixWeights, Weights};
 use flockform::flock::neighbourhood::Neighbours;
 use flockform::flock::rules::{Mean, Rotation, Rule};
 use flockform::flock::vectors::Vectors;
-use flockform::material::Block;
 use flockform::material::cells::{Cells, neighbourhood};
 use flockform::material::elastic::{Constants, Elastic, Plane};
-use flockform::material::weights::MaterialWeights;
+use flockform::material::weights::{WeightsError, assemble};
 
 pub use crate::samples::{KINDS, fibres, of_whole_cells};
 
@@ -30,6 +30,54 @@ pub fn sample(kind: LatticeKind, orientation: f64) -> (Body, Neighbours, Cells) 
     of_whole_cells(&lattice, &Cut::Count { columns: 8, rows: 9 }, &neighbourhood(&lattice))
 }
 
+/// The material as seen by each particle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaterialWeights {
+    pub neighbours: Neighbours,
+    pub weights: MatrixWeights,
+}
+
+impl MaterialWeights {
+    pub fn assemble(
+        cells: &Cells,
+        body: &Body,
+        neighbours: Neighbours,
+        elastic: &Elastic,
+    ) -> Result<Self, WeightsError> {
+        let weights = assemble(cells, body, &neighbours, elastic, Rotation::Small)?;
+        Ok(Self { neighbours, weights })
+    }
+
+    /// `D_i = sum_j K_ij`.
+    pub fn diagonal(&self, particle: usize) -> Block {
+        self.weights.stiffness_of(particle).iter().fold(Block::default(), |sum, block| plus(&sum, block))
+    }
+
+    /// The neighbours of a particle, and `K_ij`.
+    pub fn bonds(&self, particle: usize) -> impl Iterator<Item = (usize, &Block)> {
+        let seen = self.neighbours.of(particle).iter().map(|&j| j as usize);
+        seen.zip(self.weights.stiffness_of(particle))
+    }
+
+    /// `sum_j K_ij (u_j - u_i)`: zero to the last bit if all move alike.
+    pub fn force(&self, particle: usize, displacement: &Vectors) -> [f64; 2] {
+        let here = displacement.get(particle);
+        self.bonds(particle).fold([0.0; 2], |sum, (j, block)| {
+            let there = displacement.get(j);
+            let [x, y] = apply(block, [there[0] - here[0], there[1] - here[1]]);
+            [sum[0] + x, sum[1] + y]
+        })
+    }
+
+    pub fn energy(&self, displacement: &Vectors) -> f64 {
+        let work = |i: usize| {
+            let ([fx, fy], [x, y]) = (self.force(i, displacement), displacement.get(i));
+            fx * x + fy * y
+        };
+        -0.5 * (0..displacement.len()).map(work).sum::<f64>()
+    }
+}
+
 /// Particles on a free side.
 pub fn on_boundary(cells: &Cells, count: usize) -> Vec<bool> {
     let mut boundary = vec![false; count];
@@ -45,7 +93,7 @@ pub fn flock(body: &Body, weights: &MaterialWeights, forces: Option<Vectors>) ->
         rule: Rule { mean: Mean::Material { rotation: Rotation::Small }, ..Rule::BARYCENTRE },
         reference: body.reference.clone(),
         neighbours: weights.neighbours.clone(),
-        weights: Weights::Matrix(weights.weights()),
+        weights: Weights::Matrix(weights.weights.clone()),
         forces,
         rest: None,
         keeps_rest: false,
@@ -69,7 +117,7 @@ pub fn equilibrium(
     let mut entries: Vec<(usize, usize, Block)> = Vec::new();
     let mut right: Vec<f64> = Vec::new();
     for (row, &i) in followers.iter().enumerate() {
-        entries.push((row, row, weights.of(i).diagonal));
+        entries.push((row, row, weights.diagonal(i)));
         let mut load = forces.get(i);
         for (j, &block) in weights.bonds(i) {
             if leads[j] {

@@ -99,7 +99,9 @@ impl Observer for Looks {
         let hash = bits(engine.present()).fold(0, |hash: u64, bits| hash.rotate_left(7) ^ bits);
         self.seen.push((engine.step(), hash));
         if self.keep_at == Some(engine.step()) {
-            self.kept = Some((EngineState::of(engine).into_owned(), residual));
+            // As a file brings it back.
+            let bytes = postcard::to_stdvec(&EngineState::of(engine)).expect("writable");
+            self.kept = Some((postcard::from_bytes(&bytes).expect("readable"), residual));
             return ControlFlow::Break(());
         }
         ControlFlow::Continue(())

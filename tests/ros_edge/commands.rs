@@ -173,7 +173,7 @@ fn a_swarm_takes_the_commands_that_its_file_allows() {
             let request = lifecycle_msgs::ChangeStateRequest { transition };
             call::<lifecycle_msgs::ChangeState>(&client, &request, &mut || swarm.tick()).success
         };
-        assert!(!change(&mut swarm, State::Inactive.label()), "no transition");
+        assert!(!change(&mut swarm, State::Inactive.name()), "no transition");
         assert_eq!(change(&mut swarm, "deactivate"), commands == "stop-only");
         assert!(!change(&mut swarm, "activate"));
     }
@@ -290,7 +290,7 @@ fn the_log_s_level_is_read_and_set_by_the_node_s_name_where_commands_are_allowed
         };
         let asked_for = ["node.services=[\"logger-levels\"]"];
         let mut swarm = Swarming::open(&square(&[&PATIENT[..], overrides, &asked_for].concat()), &[]);
-        swarm.node.serve_log_level(level).expect("services");
+        swarm.node.share_log(Some(level), None).expect("services");
         let mapping = ServiceMapping::Enhanced;
         let get = client::<GetLoggerLevels>(&mut peers, mapping, "/flockform/get_logger_levels");
         let set = client::<SetLoggerLevels>(&mut peers, mapping, "/flockform/set_logger_levels");

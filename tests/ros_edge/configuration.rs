@@ -304,7 +304,7 @@ fn a_topic_with_two_uses_is_refused() {
     assert!(shared.contains("topic /clock has two uses: "), "{shared}");
     let file = square(&[&PATIENT[..], &["node.emergency_stop_topic=\"/rosout\""]].concat());
     let mut node = FormationNode::open(&file, &arguments(&[]), None).expect("without a log");
-    let heard = node.publish_log(std::sync::mpsc::channel().1).expect_err("two uses").to_string();
+    let heard = node.share_log(None, Some(std::sync::mpsc::channel().1)).expect_err("two uses").to_string();
     assert!(heard.contains("topic /rosout has two uses: Log of this node"), "{heard}");
     drop(node);
     // Without leaders moved by topic and without velocities those topics are not used.

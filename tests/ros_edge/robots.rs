@@ -142,7 +142,7 @@ fn the_node_of_all_robots_has_the_services_that_the_swarm_file_asks_for() {
     let swarm = square(&[&PATIENT[..], &asked_for].concat());
     let mut robots = RobotNodes::open(&swarm, &arguments(&[]), Layout::OneNode).expect("robots");
     let (get, set) = (Box::new(|| Severity::Warn), Box::new(|_| Err("as it is".to_owned())));
-    robots.serve_log_level(LogLevel { get, set }).expect("services");
+    robots.share_log(Some(LogLevel { get, set }), None).expect("services");
     let mut tick = || {
         robots.tick();
         std::thread::sleep(Duration::from_millis(5));

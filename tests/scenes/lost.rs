@@ -151,7 +151,7 @@ fn a_strip_torn_in_two_without_ghosts_comes_to_rest_in_two_unstrained_pieces_whe
     let mut kept = None;
     let outcome = run(planned(&scene), &mut |engine, residual| {
         if engine.step() == 150 {
-            kept = Some((EngineState::of(engine).into_owned(), residual));
+            kept = Some((engine.clone(), residual));
         }
         ControlFlow::Continue(())
     });
@@ -164,9 +164,9 @@ fn a_strip_torn_in_two_without_ghosts_comes_to_rest_in_two_unstrained_pieces_whe
     });
     let count = pieces.count();
     assert!(count + 4 > engine.body().count(), "{count} of {}", engine.body().count());
-    let (state, residual) = kept.expect("came that far");
+    let (then, residual) = kept.expect("came that far");
     let mut see = |_: &Engine, _: f64| ControlFlow::Continue(());
-    let from = Some((state, residual));
+    let from = Some((EngineState::of(&then), residual));
     let resumed =
         run_shared(planned(&scene), from, None::<&Team>, &mut EachStep(&mut see)).expect("the same body");
     let bits =

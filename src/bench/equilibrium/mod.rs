@@ -292,9 +292,10 @@ mod tests {
     fn the_plate_is_the_body_and_the_material_that_a_scene_would_have() {
         use crate::flock::body::{Body, Cut};
         use crate::flock::lattice::{Lattice, LatticeKind};
+        use crate::flock::rules::Rotation;
         use crate::material::cells::{Cells, neighbourhood};
         use crate::material::elastic::{Constants, Elastic, Plane};
-        use crate::material::weights::MaterialWeights;
+        use crate::material::weights::assemble;
 
         let system = Plate { cells: [6, 4], holes: false }.parts().system().expect("an operator");
         let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0; 2], 0.0);
@@ -303,17 +304,18 @@ mod tests {
             Body::build(lattice, &Cut::Count { columns: 7, rows: 5 }, &near, None).expect("fits");
         let constants = Constants::Isotropic { young: 1000.0, poisson: 0.33, plane: Plane::Stress };
         let elastic = Elastic::new(constants, 1.0).expect("admissible");
-        let weights = MaterialWeights::assemble(&Cells::of_body(&body), &body, neighbours, &elastic);
+        let weights = assemble(&Cells::of_body(&body), &body, &neighbours, &elastic, Rotation::Small);
         let weights = weights.expect("holds together");
         for i in (0..body.count()).filter(|&i| system.operator.follows()[i]) {
             let row = system.operator.row(i);
-            for (j, block) in weights.bonds(i) {
+            for (&j, block) in neighbours.of(i).iter().zip(weights.stiffness_of(i)) {
+                let j = j as usize;
                 let offset = [0, 1].map(|k| body.sites[j][k] - body.sites[i][k]);
                 let entry = row.entries.iter().find(|entry| entry.0 == offset).expect("a neighbour");
                 let pairs = entry.1.iter().flatten().zip(block.iter().flatten());
                 assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-9), "{i} {offset:?}");
             }
-            assert_eq!(row.entries.len(), weights.neighbours.of(i).len());
+            assert_eq!(row.entries.len(), neighbours.of(i).len());
         }
         let total: f64 = system.forces.y.iter().sum();
         assert!((total - 4.0 * 50.0).abs() < 1e-9);

@@ -82,15 +82,14 @@ mod over_dds {
     use super::super::formation;
     use super::{Case, Report};
     use crate::flock::vectors::Vectors;
-    use crate::messages::builtin_interfaces::Time;
-    use crate::messages::geometry_msgs::{Pose, PoseStamped};
-    use crate::messages::std_msgs::Header;
     use crate::ros::arguments::{DiscoveryRange, Environment, RosArguments};
-    use crate::ros::edge::{Edge, Node, Options, Publisher, Quality, Subscription};
     use crate::ros::node::FormationNode;
+    use crate::ros::robots::{Layout, Link};
     use crate::scene::swarm::Swarm;
     use crate::swarm::control::Control;
     use crate::swarm::pace::system_time;
+    use crate::swarm::transport::RobotsEnd;
+    use crate::swarm::watch::Pose;
 
     /// Of the node's loop [s]: as fast as it goes.
     const PERIOD: f64 = 0.002;
@@ -167,42 +166,22 @@ mod over_dds {
     /// The robots' side.
     struct Fleet {
         places: Vectors,
-        poses: Vec<Publisher<PoseStamped>>,
-        targets: Vec<Subscription<PoseStamped>>,
-        frame_id: String,
+        link: Link,
         round: usize,
-        // Dropped after all that was made from it.
-        _node: Node,
     }
 
     impl Fleet {
         fn open(swarm: &Swarm) -> Result<Self, String> {
             let control = Control::new(swarm).map_err(words)?;
             let formation = control.formation();
-            let arguments = arguments();
-            let domain = arguments.environment.domain;
-            let edge = Edge::open(Options { domain, loopback_only: true }).map_err(words)?;
-            let node = edge.node("/", "bench_robots").map_err(words)?;
-            let raw = &swarm.raw.node;
-            let topic = |pattern: &str, name: &str| node.topic(&pattern.replace("{name}", name));
-            let names = &formation.names;
-            let pose = |name: &String| node.publisher(&topic(&raw.pose_topic, name)?, Quality::BEST_EFFORT);
-            let target =
-                |name: &String| node.subscription(&topic(&raw.target_topic, name)?, Quality::reliable(1));
-            Ok(Self {
-                places: formation.places.clone(),
-                poses: names.iter().map(pose).collect::<Result<_, _>>().map_err(words)?,
-                targets: names.iter().map(target).collect::<Result<_, _>>().map_err(words)?,
-                frame_id: raw.frame_id.clone(),
-                round: 0,
-                _node: node,
-            })
+            let link = Link::open(swarm, formation, &arguments(), Layout::OneNode).map_err(words)?;
+            Ok(Self { places: formation.places.clone(), link, round: 0 })
         }
 
         /// Times from pose to target [s], and how many targets never came.
         fn fly(&mut self, rounds: usize, tick: &mut dyn FnMut()) -> Result<(Vec<f64>, usize), String> {
             let begun = Instant::now();
-            let mut known = vec![false; self.poses.len()];
+            let mut known = vec![false; self.places.len()];
             while known.contains(&false) {
                 if begun.elapsed() > DISCOVERY {
                     return Err(format!("the participants did not find each other within {DISCOVERY:?}"));
@@ -236,28 +215,25 @@ mod over_dds {
         ) -> Result<Vec<(usize, Option<f64>)>, String> {
             self.round += 1;
             let aside = STRIDE * (self.round % 4) as f64;
-            let count = self.poses.len();
+            let count = self.places.len();
             let here: Vectors = self.places.iter().map(|[x, y]| [x, y + aside]).collect();
             let mut sent = Vec::with_capacity(count);
             for member in 0..count {
-                let header =
-                    Header { stamp: Time::from_seconds(system_time()), frame_id: self.frame_id.clone() };
-                let message = PoseStamped { header, pose: Pose::planar(here.get(member), 0.0) };
+                let (position, stamp) = (here.get(member), system_time());
+                let pose = Pose { position, yaw: 0.0, stamp, frame_is_right: true };
                 sent.push(Instant::now());
-                self.poses[member].publish(&message).map_err(words)?;
+                self.link.send(stamp, &[(member, pose)]).map_err(words)?;
             }
             let mut answered: Vec<(usize, Option<f64>)> = (0..count).map(|member| (member, None)).collect();
             let begun = Instant::now();
             while begun.elapsed() < patience && answered.iter().any(|(_, time)| time.is_none()) {
                 tick();
-                for (member, time) in answered.iter_mut().filter(|(_, time)| time.is_none()) {
-                    let Some((target, _)) = self.targets[*member].take_last() else { continue };
-                    let [x, y] = here.get(*member);
-                    let place = target.pose.position;
-                    if (place.x - x).abs() < NEAR && (place.y - y).abs() < NEAR {
-                        *time = Some(sent[*member].elapsed().as_secs_f64());
+                self.link.targets(&mut |member, target| {
+                    let (here, time) = (here.get(member), &mut answered[member].1);
+                    if time.is_none() && (0..2).all(|k| (target[k] - here[k]).abs() < NEAR) {
+                        *time = Some(sent[member].elapsed().as_secs_f64());
                     }
-                }
+                });
                 std::thread::sleep(LOOK);
             }
             Ok(answered)

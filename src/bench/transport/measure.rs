@@ -7,33 +7,24 @@ use serde::Serialize;
 
 use crate::bench::machine::quantile;
 
-/// The work that is timed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Work {
-    /// A message that is ready is handed over.
-    HandOff,
-    /// Every pose is written and read as well.
-    FilledAndRead,
+named! {
+    /// The work that is timed.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Work {
+        /// A message that is ready is handed over.
+        HandOff => "hand-off",
+        /// Every pose is written and read as well.
+        FilledAndRead => "filled-and-read",
+    }
 }
 
 impl Work {
-    /// Every kind of work.
-    pub const ALL: [Self; 2] = [Self::HandOff, Self::FilledAndRead];
-
     /// A heading for tables.
     pub fn words(self) -> &'static str {
         match self {
             Self::HandOff => "Hand-off of a message that is ready",
             Self::FilledAndRead => "Every pose written, and every pose read",
-        }
-    }
-
-    /// As it stands in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::HandOff => "hand-off",
-            Self::FilledAndRead => "filled-and-read",
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::flock::region::{Region, Side};
 use crate::flock::vectors::distance;
 use crate::geometry::locate::Finder;
 use crate::geometry::outline::{Outline, Place};
-use crate::geometry::portion::{Portion, Selection};
+use crate::geometry::portion::{Area, Portion, Selection};
 use crate::material::boundary::Boundary;
 use crate::scene::{BodySource, Scene, SceneError, SceneRegion};
 
@@ -26,7 +26,7 @@ fn band(outline: &Outline, side: Side, depth: f64, grain: f64) -> Vec<Portion> {
         Side::Bottom => max[1] = low[1] + depth,
         Side::Top => min[1] = high[1] - depth,
     }
-    outline.portions(&Selection::Box { min, max }, grain)
+    outline.portions(&Selection::In(Area::Box { min, max }), grain)
 }
 
 /// The warnings about regions that hold what is outermost on a side that is not straight, and less of it the narrower the
@@ -99,10 +99,7 @@ impl Layout {
             SceneRegion::Known(region) => match region {
                 Region::All | Region::Boundary => outline.portions(&Selection::All, grain),
                 Region::Edge { side, depth } => band(*side, *depth),
-                Region::Box { min, max } => outline.portions(&Selection::Box { min: *min, max: *max }, grain),
-                Region::Disc { centre, radius } => {
-                    outline.portions(&Selection::Disc { centre: *centre, radius: *radius }, grain)
-                }
+                Region::In(area) => outline.portions(&Selection::In(*area), grain),
                 Region::Ids(ids) => self.portions_between(ids, outline),
             },
         }

@@ -24,12 +24,18 @@ fn resumed(
     run_shared(plan, Some(from), None::<&Team>, &mut EachStep(see)).expect("the same body")
 }
 
+/// A state as it comes back from a file.
+fn through_bytes(engine: &Engine) -> EngineState<'static> {
+    let bytes = postcard::to_stdvec(&EngineState::of(engine)).expect("writable");
+    postcard::from_bytes(&bytes).expect("readable")
+}
+
 /// The state, and what depends on the neighbours: PE1 and the residual, then how the run ended.
 fn bits(outcome: &Outcome) -> (EngineState<'static>, Vec<u64>, String) {
     let engine = &outcome.engine;
     let pe1 = (0..engine.body().count()).map(|i| engine.pe1(i));
     let numbers = pe1.chain([outcome.residual]).map(f64::to_bits).collect();
-    (EngineState::of(engine).into_owned(), numbers, format!("{:?}", outcome.reason))
+    (through_bytes(engine), numbers, format!("{:?}", outcome.reason))
 }
 
 /// Runs whole, and again broken off at every one of `at`, through bytes.
@@ -40,7 +46,7 @@ fn continues_to_the_same_end(name: &str, sets: &[&str], at: &[usize]) {
         let mut kept = None;
         let _ = run(plan(&scene), &mut |engine, residual| {
             if engine.step() == step {
-                kept = Some((EngineState::of(engine).into_owned(), residual));
+                kept = Some((through_bytes(engine), residual));
                 return ControlFlow::Break(());
             }
             ControlFlow::Continue(())

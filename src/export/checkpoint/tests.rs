@@ -10,7 +10,7 @@ fn scene(sets: &[&str]) -> Scene {
     bundled("tension").expect("bundled").load(&sets).expect("valid")
 }
 
-fn written(folder: &Path) -> (EngineState<'static>, Vec<u8>) {
+fn written(folder: &Path) -> (Engine, Vec<u8>) {
     let scene = scene(&[]);
     let plan = Plan::new(&scene).expect("fits");
     let sum = digest(&plan);
@@ -21,26 +21,26 @@ fn written(folder: &Path) -> (EngineState<'static>, Vec<u8>) {
         probe.record(&engine);
     }
     let asked = RunRequest { scene: "tension".into(), set: vec!["a.b=1".into()], force: false };
-    let state = EngineState::of(&engine);
     let records =
         Records { snapshots: vec![Snapshot::of(&engine)], probes: vec![probe], ..Records::default() };
     let checkpoint = Checkpoint::new(
         (&asked, &scene, sum),
-        (state.clone(), f64::INFINITY),
+        (EngineState::of(&engine), f64::INFINITY),
         (Cow::Borrowed(&records), None),
         Duration::from_millis(1500),
     );
     checkpoint.write(folder).expect("written");
-    (state.into_owned(), fs::read(folder.join(FILE)).expect("there"))
+    let bytes = fs::read(folder.join(FILE)).expect("there");
+    (engine, bytes)
 }
 
 #[test]
 fn a_checkpoint_is_read_back_to_the_bit() {
     let folder = tempfile::tempdir().expect("a folder");
     assert!(Checkpoint::read(folder.path()).expect("readable").is_none());
-    let (state, _) = written(folder.path());
+    let (engine, _) = written(folder.path());
     let read = Checkpoint::read(folder.path()).expect("readable").expect("there");
-    assert_eq!(read.engine, state);
+    assert_eq!(read.engine, EngineState::of(&engine));
     assert_eq!(read.residual, f64::INFINITY);
     assert_eq!(read.stepping, Duration::from_millis(1500));
     let mut other = read.clone();

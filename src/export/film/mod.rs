@@ -34,29 +34,31 @@ const FRAME_TIME: [f64; 2] = [4.0, 20.0];
 /// How much longer the last frame stands \[s/100\].
 const LAST: u16 = 150;
 
-/// The quantity that colours show.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FilmColour {
-    /// The role of a particle or robot.
-    Role,
-    /// Length of the displacement from the start.
-    Displacement,
-    /// First pseudo-energy.
-    Pe1,
-    /// Second pseudo-energy: the length of the last move.
-    Pe2,
-    /// The principal strain largest in size.
-    Strain,
-    /// Von Mises stress.
-    VonMises,
-    /// Free space around a robot.
-    Clearance,
-    /// Distance of a robot from its place.
-    Away,
-    /// Speed of a robot.
-    Speed,
-    /// Acceleration of a robot.
-    Acceleration,
+named! {
+    /// The quantity that colours show.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum FilmColour {
+        /// The role of a particle or robot.
+        Role => "role",
+        /// Length of the displacement from the start.
+        Displacement => "displacement",
+        /// First pseudo-energy.
+        Pe1 => "pe1",
+        /// Second pseudo-energy: the length of the last move.
+        Pe2 => "pe2",
+        /// The principal strain largest in size.
+        Strain => "strain",
+        /// Von Mises stress.
+        VonMises => "von-mises",
+        /// Free space around a robot.
+        Clearance => "clearance",
+        /// Distance of a robot from its place.
+        Away => "away",
+        /// Speed of a robot.
+        Speed => "speed",
+        /// Acceleration of a robot.
+        Acceleration => "acceleration",
+    }
 }
 
 impl FilmColour {
@@ -75,22 +77,6 @@ impl FilmColour {
         Self::Pe1,
         Self::Strain,
     ];
-
-    /// The name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Role => "role",
-            Self::Displacement => "displacement",
-            Self::Pe1 => "pe1",
-            Self::Pe2 => "pe2",
-            Self::Strain => "strain",
-            Self::VonMises => "von-mises",
-            Self::Clearance => "clearance",
-            Self::Away => "away",
-            Self::Speed => "speed",
-            Self::Acceleration => "acceleration",
-        }
-    }
 }
 
 /// Values of a film's particles or robots on a scale for all its frames.

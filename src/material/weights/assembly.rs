@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::{Row, WeightsError};
+use super::WeightsError;
 use crate::flock::block::{Block, inverse, plus};
 use crate::flock::cells_around::CellsAround;
 use crate::flock::neighbourhood::Neighbours;
@@ -17,6 +17,10 @@ use crate::material::stiffness::mean_gradients;
 
 /// Particles whose classes one thread finds at a time.
 const CHUNK: usize = 1 << 14;
+
+/// The stiffness that the particles of a class feel: `K_ij` \[force / length\] in the order of the particle's neighbours, and
+/// the inverse of their sum `D_i` \[length / force\].
+pub(super) type Row = (Vec<Block>, Block);
 
 /// The parts that the rows are put together from.
 pub(super) struct Assembly<'a> {
@@ -243,7 +247,7 @@ impl<'a> Assembly<'a> {
             None if self.around(particle).next().is_none() => Block::default(),
             None => return Err(WeightsError::Singular { particle: particle + 1 }),
         };
-        Ok(Row { blocks, diagonal, inverse })
+        Ok((blocks, inverse))
     }
 
     fn around(&self, particle: usize) -> impl Iterator<Item = usize> {

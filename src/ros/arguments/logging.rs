@@ -2,16 +2,18 @@
 
 use super::RosArgumentError;
 
-/// Severity of a log message, as `rcutils` names them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Severity {
-    /// The severity of the logger's parent.
-    Unset,
-    Debug,
-    Info,
-    Warn,
-    Error,
-    Fatal,
+named! {
+    /// Severity of a log message, as `rcutils` names them.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    pub enum Severity {
+        /// The severity of the logger's parent.
+        Unset => "UNSET",
+        Debug => "DEBUG",
+        Info => "INFO",
+        Warn => "WARN",
+        Error => "ERROR",
+        Fatal => "FATAL",
+    }
 }
 
 /// Which messages are logged, and to where; `Default` is the behaviour without arguments.
@@ -56,8 +58,6 @@ impl Logging {
 }
 
 impl Severity {
-    const ALL: [Self; 6] = [Self::Unset, Self::Debug, Self::Info, Self::Warn, Self::Error, Self::Fatal];
-
     /// The number in `rcl_interfaces/msg/LoggerLevel` and `rcl_interfaces/msg/Log`.
     pub fn number(self) -> u32 {
         10 * self as u32
@@ -66,18 +66,6 @@ impl Severity {
     /// The severity of a number, if there is one.
     pub(crate) fn of_number(number: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|severity| severity.number() == number)
-    }
-
-    /// As in lines of a log.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Unset => "UNSET",
-            Self::Debug => "DEBUG",
-            Self::Info => "INFO",
-            Self::Warn => "WARN",
-            Self::Error => "ERROR",
-            Self::Fatal => "FATAL",
-        }
     }
 
     fn parse(word: &str) -> Option<Self> {

@@ -36,7 +36,7 @@ impl FormationNode {
         };
         let text = |(name, value): (&str, &Value)| Some((name.to_owned(), value.as_str()?.to_owned()));
         NodeSnapshot {
-            state: self.lifecycle.state().label().to_owned(),
+            state: self.lifecycle.state().name().to_owned(),
             control: self.control.kept(),
             parameters: self.parameters.iter().filter_map(number).collect(),
             names: self.parameters.iter().filter_map(text).collect(),
@@ -62,7 +62,7 @@ impl FormationNode {
         // Requests wait for the first tick, which knows what peers may do.
         let changes = self.parameters.changes(now);
         self.apply(&changes, now);
-        if let Some(state) = State::ALL.into_iter().find(|state| state.label() == kept.state) {
+        if let Some(state) = State::ALL.into_iter().find(|state| state.name() == kept.state) {
             self.go_to(state, now);
         }
         self.control.restore(kept.control);

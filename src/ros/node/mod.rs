@@ -216,23 +216,19 @@ impl FormationNode {
         Ok(())
     }
 
-    /// Lets peers read and set the level of this log, where the swarm file asks for that.
+    /// Lets peers read and set the level of this log, where the swarm file asks for that, and publishes its lines.
     ///
     /// # Errors
-    /// A service that the middleware refuses.
-    pub fn serve_log_level(&mut self, level: LogLevel) -> Result<(), EdgeError> {
-        if self.origin.swarm.raw.node.serves(RawService::LoggerLevels) {
-            self.loggers = Some(Loggers::new(&self.origin.node, level)?);
-        }
-        Ok(())
-    }
-
-    /// Publishes these lines of the log.
-    ///
-    /// # Errors
-    /// A topic that the middleware refuses.
-    pub fn publish_log(&mut self, lines: Receiver<Log>) -> Result<(), EdgeError> {
-        self.rosout = Some(Rosout::new(&self.origin.node, lines)?);
+    /// A service or a topic that the middleware refuses.
+    pub fn share_log(
+        &mut self,
+        level: Option<LogLevel>,
+        lines: Option<Receiver<Log>>,
+    ) -> Result<(), EdgeError> {
+        let Origin { node, swarm, .. } = &self.origin;
+        let level = level.filter(|_| swarm.raw.node.serves(RawService::LoggerLevels));
+        self.loggers = level.map(|level| Loggers::new(node, level)).transpose()?;
+        self.rosout = lines.map(|lines| Rosout::new(node, lines)).transpose()?;
         Ok(())
     }
 
@@ -475,7 +471,7 @@ impl FormationNode {
             (true, _) => Ok(format!("{label}: done")),
             (false, Some(reason)) => Err(reason.to_owned()),
             (false, None) => {
-                Err(format!("{label}: not possible, the node is {}", self.lifecycle.state().label()))
+                Err(format!("{label}: not possible, the node is {}", self.lifecycle.state().name()))
             }
         });
         for (number, command) in own {

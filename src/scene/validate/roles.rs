@@ -8,7 +8,7 @@ use crate::flock::motion::{Keyframe, Motion};
 use crate::flock::region::Region;
 use crate::flock::role::Role;
 use crate::flock::rules::Axis;
-use crate::geometry::portion::Selection;
+use crate::geometry::portion::{Area, Selection};
 use crate::scene::document::problem::SceneError;
 use crate::scene::raw::*;
 use crate::scene::table::DisplacementTable;
@@ -60,9 +60,9 @@ pub fn region(key: &str, raw: &RawRegion, refuse: Refuse<'_>) -> Result<SceneReg
         RawRegion::Edge { side, depth: Some(depth) } => Region::Edge { side: (*side).into(), depth: *depth },
         RawRegion::Box { min, max } => {
             ordered_box(&format!("{key}.region"), *min, *max, refuse)?;
-            Region::Box { min: *min, max: *max }
+            Region::In(Area::Box { min: *min, max: *max })
         }
-        RawRegion::Disc { centre, radius } => Region::Disc { centre: *centre, radius: *radius },
+        RawRegion::Disc { centre, radius } => Region::In(Area::Disc { centre: *centre, radius: *radius }),
         RawRegion::Ids { ids } => Region::Ids(ids.clone()),
         RawRegion::Boundary {} => Region::Boundary,
         RawRegion::Outline { hole, pieces, angles, between } => {

@@ -48,46 +48,26 @@ use system::Prepared;
 /// Relative residual that no whole solve in single precision is asked to go below.
 pub const SINGLE_FLOOR: f64 = 1e-5;
 
-/// The solvers there are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Solver {
-    /// The synchronous sweep, damped: see [`jacobi`].
-    Jacobi,
-    /// The sequential sweep, by colours: see [`gauss_seidel`].
-    GaussSeidel,
-    /// Synchronous sweeps of varied damping: see [`chebyshev`].
-    Chebyshev,
-    /// Sweeps with memory: see [`conjugate_gradients`].
-    ConjugateGradients,
-    /// Conjugate gradients on coarser and coarser grids: see [`multigrid`].
-    Multigrid,
-    /// A sparse factorisation: see [`direct`].
-    Direct,
+named! {
+    /// The solvers there are.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+    pub enum Solver {
+        /// The synchronous sweep, damped: see [`jacobi`].
+        Jacobi => "jacobi",
+        /// The sequential sweep, by colours: see [`gauss_seidel`].
+        GaussSeidel => "gauss-seidel",
+        /// Synchronous sweeps of varied damping: see [`chebyshev`].
+        Chebyshev => "chebyshev",
+        /// Sweeps with memory: see [`conjugate_gradients`].
+        ConjugateGradients => "conjugate-gradients",
+        /// Conjugate gradients on coarser and coarser grids: see [`multigrid`].
+        Multigrid => "multigrid",
+        /// A sparse factorisation: see [`direct`].
+        Direct => "direct",
+    }
 }
 
 impl Solver {
-    /// Every solver.
-    pub const ALL: [Solver; 6] = [
-        Solver::Jacobi,
-        Solver::GaussSeidel,
-        Solver::Chebyshev,
-        Solver::ConjugateGradients,
-        Solver::Multigrid,
-        Solver::Direct,
-    ];
-
-    /// The name in scene files and messages.
-    pub fn name(self) -> &'static str {
-        match self {
-            Solver::Jacobi => "jacobi",
-            Solver::GaussSeidel => "gauss-seidel",
-            Solver::Chebyshev => "chebyshev",
-            Solver::ConjugateGradients => "conjugate-gradients",
-            Solver::Multigrid => "multigrid",
-            Solver::Direct => "direct",
-        }
-    }
-
     /// Whether it only converges where any two neighbours feel each other alike.
     pub fn needs_symmetry(self) -> bool {
         matches!(self, Solver::Chebyshev | Solver::ConjugateGradients | Solver::Multigrid)

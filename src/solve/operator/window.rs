@@ -14,6 +14,7 @@ use super::matrix::{HELD, Matrix, cost_of_each, group_size};
 use super::rows::Rows;
 use crate::flock::block::Block;
 use crate::flock::body::Body;
+use crate::flock::halo::{Halo, meet};
 use crate::flock::lattice::Site;
 use crate::flock::splitmix::{STEP, mixed};
 use crate::ranks::Team;
@@ -269,11 +270,6 @@ fn block(words: &[u64]) -> Block {
     [[entry(0), entry(1)], [entry(2), entry(3)]]
 }
 
-fn meet(a: &Range<i32>, b: &Range<i32>) -> Range<i32> {
-    let start = a.start.max(b.start);
-    start..a.end.min(b.end).max(start)
-}
-
 /// The columns that this rank `wants` of a matrix, of which each rank speaks for its share.
 pub fn fetched(
     team: &Team,
@@ -282,24 +278,18 @@ pub fn fetched(
     wants: &[Range<i32>],
 ) -> Matrix {
     let rank = team.rank();
-    let others = || (0..team.count()).filter(|&other| other != rank);
-    let sent = |other: usize| Some(meet(&shares[rank], &wants[other])).filter(|of| !of.is_empty());
-    let received = |other: usize| meet(&shares[other], &wants[rank]);
-    let messages: Vec<(usize, Vec<u64>)> =
-        others().filter_map(|other| Some((other, packed(matrix, sent(other)?, step)))).collect();
+    let Halo { sends, receives } =
+        Halo::new((rank, team.count()), |of| shares[of].clone(), |of| wants[of].clone());
+    let messages: Vec<_> = sends.into_iter().map(|(other, of)| (other, packed(matrix, of, step))).collect();
     let lengths: Vec<_> = messages.iter().map(|(to, words)| (*to, vec![words.len() as u64])).collect();
-    let from: Vec<(usize, usize)> =
-        others().filter(|&other| !received(other).is_empty()).map(|other| (other, 1)).collect();
+    let from: Vec<_> = receives.iter().map(|(other, _)| (*other, 1)).collect();
     let sizes = team.swap(&lengths, &from).into_iter().map(|words| words[0] as usize);
-    let from: Vec<(usize, usize)> = from.iter().map(|(other, _)| *other).zip(sizes).collect();
-    let mut arrived = team.swap(&messages, &from).into_iter();
+    let from: Vec<_> = receives.iter().map(|(other, _)| *other).zip(sizes).collect();
+    let arrived = receives.into_iter().zip(team.swap(&messages, &from));
+    let own = meet(&shares[rank], &wants[rank]).map(|of| ((rank, of.clone()), packed(matrix, of, step)));
+    let mut all: Vec<_> = arrived.chain(own).collect();
+    all.sort_by_key(|((of, _), _)| *of);
     let mut assembly = Assembly::new(wants[rank].start, step);
-    for (other, columns) in (0..team.count()).map(|other| (other, received(other))) {
-        match () {
-            () if columns.is_empty() => {}
-            () if other == rank => assembly.add(columns.len(), &packed(matrix, columns, step)),
-            () => assembly.add(columns.len(), &arrived.next().expect("as many as were sent")),
-        }
-    }
+    all.iter().for_each(|((_, columns), words)| assembly.add(columns.len(), words));
     assembly.into_matrix().with_outliers(matrix.outliers.clone())
 }

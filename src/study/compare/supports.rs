@@ -8,14 +8,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::continuum::layout::Layout;
 use crate::engine::setup::{RoleChange, of_first_roles};
-use crate::fem::{Field, Holding, PlaneRegion, Support, WayField};
+use crate::fem::{Field, Holding, Support, WayField};
 use crate::flock::motion::Motion;
 use crate::flock::region::Region;
 use crate::flock::role::Role;
 use crate::flock::vectors::distance;
 use crate::geometry::outline::Outline;
 use crate::geometry::point::{Point, bounds};
-use crate::geometry::portion::{Portion, Selection};
+use crate::geometry::portion::{Area, Portion, Selection};
 use crate::material::cells::Cells;
 use crate::scene::{Scene, SceneError, SceneRegion};
 
@@ -166,21 +166,19 @@ impl Picked<'_> {
         let along = |portions: Vec<Portion>| {
             (is_outer && !portions.is_empty()).then_some(Holding::Portions(portions))
         };
-        let around = |centre| PlaneRegion::Disc { centre, radius: self.farthest(all, centre) };
+        let spanned = Area::Box { min, max };
+        let around = |centre| Area::Disc { centre, radius: self.farthest(all, centre) };
         Ok(match known {
             Region::Boundary => Some(Holding::Portions(self.outline.portions(&Selection::All, near))),
             Region::Ids(_) => None,
-            Region::All => Some(Holding::Region(PlaneRegion::Box { min, max })),
-            Region::Box { .. } | Region::Edge { .. } if has_cell => {
-                Some(Holding::Region(PlaneRegion::Box { min, max }))
-            }
+            Region::All => Some(Holding::Region(spanned)),
+            Region::In(Area::Disc { centre, .. }) if has_cell => Some(Holding::Region(around(*centre))),
+            Region::In(_) | Region::Edge { .. } if has_cell => Some(Holding::Region(spanned)),
             Region::Edge { .. } if !is_outer => Some(Holding::Portions(on_outline()?)),
-            Region::Box { .. } | Region::Edge { .. } => along(on(Selection::Box { min, max })),
-            Region::Disc { centre, .. } if has_cell => Some(Holding::Region(around(*centre))),
-            Region::Disc { centre, radius } => {
-                let within = on(Selection::Disc { centre: *centre, radius: *radius });
-                along(common(&within, &on(Selection::Box { min, max })))
+            Region::In(disc @ Area::Disc { .. }) => {
+                along(common(&on(Selection::In(*disc)), &on(Selection::In(spanned))))
             }
+            Region::In(Area::Box { .. }) | Region::Edge { .. } => along(on(Selection::In(spanned))),
         })
     }
 

@@ -237,16 +237,6 @@ fn sweep(
     Sweep { parameter, present: subject.present(parameter), spectrum, runs }
 }
 
-impl Side {
-    /// The name in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Side::Lower => "lower",
-            Side::Upper => "upper",
-        }
-    }
-}
-
 impl Study {
     /// Whether every prediction that settled agrees with its bisection and no extreme is wrong.
     pub fn holds(&self) -> bool {

@@ -14,26 +14,15 @@ use crate::scene::{Scene, SceneError};
 use crate::solve::spectrum::LinearSweep;
 use crate::sweep::Order;
 
-/// The parameter that is varied.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Parameter {
-    /// The feedback factor `fd` of Eq. 4.
-    Feedback,
-    /// The damping of the update.
-    Damping,
-}
-
-impl Parameter {
-    /// Every parameter.
-    pub const ALL: [Parameter; 2] = [Parameter::Feedback, Parameter::Damping];
-
-    /// The name in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Parameter::Feedback => "feedback factor",
-            Parameter::Damping => "damping",
-        }
+named! {
+    /// The parameter that is varied.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Parameter {
+        /// The feedback factor `fd` of Eq. 4.
+        Feedback => "feedback factor",
+        /// The damping of the update.
+        Damping => "damping",
     }
 }
 

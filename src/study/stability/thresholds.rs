@@ -14,14 +14,16 @@ use crate::flock::rules::FeedbackReference;
 use crate::solve::spectrum::Ends;
 use crate::sweep::Order;
 
-/// Which end of the stable range.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Side {
-    /// Where the range begins.
-    Lower,
-    /// Where the range ends.
-    Upper,
+named! {
+    /// Which end of the stable range.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Side {
+        /// Where the range begins.
+        Lower => "lower",
+        /// Where the range ends.
+        Upper => "upper",
+    }
 }
 
 /// A value of a parameter beyond which the body grows.

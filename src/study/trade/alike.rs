@@ -14,9 +14,8 @@ pub(super) type Extent = (String, [[f64; 2]; 2]);
 /// # Errors
 /// Names a region that holds none.
 pub(super) fn extents_of_roles(scene: &Scene, layout: &Layout) -> Result<Vec<Extent>, SceneError> {
-    let by_place = |region: &SceneRegion| {
-        matches!(region, SceneRegion::Known(Region::Box { .. } | Region::Disc { .. } | Region::Edge { .. }))
-    };
+    let by_place =
+        |region: &SceneRegion| matches!(region, SceneRegion::Known(Region::In(_) | Region::Edge { .. }));
     let by_place = scene.roles.iter().enumerate().filter(|(_, entry)| by_place(&entry.region));
     by_place
         .map(|(k, entry)| {

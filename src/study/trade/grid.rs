@@ -50,26 +50,15 @@ impl Grid {
     }
 }
 
-/// The rule of a setting.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum RuleChoice {
-    /// Eq. 1, with the scene's neighbours or the first ones.
-    Paper,
-    /// The matrix weights of the scene's material.
-    Material,
-}
-
-impl RuleChoice {
-    /// Every rule.
-    pub const ALL: [RuleChoice; 2] = [RuleChoice::Paper, RuleChoice::Material];
-
-    /// The name in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            RuleChoice::Paper => "paper",
-            RuleChoice::Material => "material",
-        }
+named! {
+    /// The rule of a setting.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum RuleChoice {
+        /// Eq. 1, with the scene's neighbours or the first ones.
+        Paper => "paper",
+        /// The matrix weights of the scene's material.
+        Material => "material",
     }
 }
 

@@ -33,36 +33,27 @@ pub struct Pose {
     pub frame_is_right: bool,
 }
 
-/// The state of a member's poses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Health {
-    /// No pose accepted yet, or the clock has been set back.
-    Waiting,
-    /// Young enough to count as the present pose.
-    Fresh,
-    /// The last pose still stands in for the present one.
-    Held,
-    /// Too old to be used: the member counts as no other member's neighbour, and its own target stays.
-    Degraded,
-    /// Silent for so long that it must prove itself before it goes on.
-    Stopped,
+named! {
+    /// The state of a member's poses.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Health {
+        /// No pose accepted yet, or the clock has been set back.
+        Waiting => "waiting",
+        /// Young enough to count as the present pose.
+        Fresh => "fresh",
+        /// The last pose still stands in for the present one.
+        Held => "held",
+        /// Too old to be used: the member counts as no other member's neighbour, and its own target stays.
+        Degraded => "degraded",
+        /// Silent for so long that it must prove itself before it goes on.
+        Stopped => "stopped",
+    }
 }
 
 impl Health {
     /// The number in messages and in shared memory.
     pub const fn number(self) -> u8 {
         self as u8
-    }
-
-    /// The name in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Health::Waiting => "waiting",
-            Health::Fresh => "fresh",
-            Health::Held => "held",
-            Health::Degraded => "degraded",
-            Health::Stopped => "stopped",
-        }
     }
 
     /// Whether there is a position to use.

@@ -1,58 +1,29 @@
 //! The state machine. Pure.
 
-/// Primary and transition states; the numbers are those of `lifecycle_msgs/msg/State`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-pub enum State {
-    Unknown = 0,
-    #[default]
-    Unconfigured = 1,
-    Inactive = 2,
-    Active = 3,
-    Finalized = 4,
-    Configuring = 10,
-    CleaningUp = 11,
-    ShuttingDown = 12,
-    Activating = 13,
-    Deactivating = 14,
-    ErrorProcessing = 15,
+named! {
+    /// Primary and transition states, in the order that ROS 2 lists them; the numbers are those of `lifecycle_msgs/msg/State`.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    #[repr(u8)]
+    pub enum State {
+        Unknown = 0 => "unknown",
+        #[default]
+        Unconfigured = 1 => "unconfigured",
+        Inactive = 2 => "inactive",
+        Active = 3 => "active",
+        Finalized = 4 => "finalized",
+        Configuring = 10 => "configuring",
+        CleaningUp = 11 => "cleaningup",
+        ShuttingDown = 12 => "shuttingdown",
+        Activating = 13 => "activating",
+        Deactivating = 14 => "deactivating",
+        ErrorProcessing = 15 => "errorprocessing",
+    }
 }
 
 impl State {
-    /// Every state, in the order that ROS 2 lists them.
-    pub const ALL: [State; 11] = [
-        State::Unknown,
-        State::Unconfigured,
-        State::Inactive,
-        State::Active,
-        State::Finalized,
-        State::Configuring,
-        State::CleaningUp,
-        State::ShuttingDown,
-        State::Activating,
-        State::Deactivating,
-        State::ErrorProcessing,
-    ];
-
     /// Number in `lifecycle_msgs/msg/State`.
     pub fn id(self) -> u8 {
         self as u8
-    }
-
-    pub fn label(self) -> &'static str {
-        match self {
-            State::Unknown => "unknown",
-            State::Unconfigured => "unconfigured",
-            State::Inactive => "inactive",
-            State::Active => "active",
-            State::Finalized => "finalized",
-            State::Configuring => "configuring",
-            State::CleaningUp => "cleaningup",
-            State::ShuttingDown => "shuttingdown",
-            State::Activating => "activating",
-            State::Deactivating => "deactivating",
-            State::ErrorProcessing => "errorprocessing",
-        }
     }
 }
 

@@ -162,7 +162,7 @@ impl Lifecycle {
 }
 
 fn state(state: State) -> msgs::State {
-    msgs::State { id: state.id(), label: state.label().into() }
+    msgs::State { id: state.id(), label: state.name().into() }
 }
 
 fn description(edge: Transition) -> msgs::TransitionDescription {

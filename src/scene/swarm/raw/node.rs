@@ -104,30 +104,23 @@ pub enum RawService {
     TypeDescription,
 }
 
-/// Commands that are accepted while the node runs. The limits of the file hold in any case: commands can
-/// tighten them and never loosen them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum RawCommands {
-    /// None: services refuse, parameters are read-only, leaders are moved by the file's programs alone.
-    None,
-    /// Emergency stop, and the lifecycle's way out of active.
-    StopOnly,
-    /// All services, parameters, and the topics of leaders that are led from outside.
-    #[default]
-    All,
+named! {
+    /// Commands that are accepted while the node runs. The limits of the file hold in any case: commands can
+    /// tighten them and never loosen them.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum RawCommands {
+        /// None: services refuse, parameters are read-only, leaders are moved by the file's programs alone.
+        None => "none",
+        /// Emergency stop, and the lifecycle's way out of active.
+        StopOnly => "stop-only",
+        /// All services, parameters, and the topics of leaders that are led from outside.
+        #[default]
+        All => "all",
+    }
 }
 
 impl RawCommands {
-    /// The name in the file.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::StopOnly => "stop-only",
-            Self::All => "all",
-        }
-    }
-
     /// Whether an emergency stop is accepted.
     pub fn may_stop(self) -> bool {
         self != Self::None

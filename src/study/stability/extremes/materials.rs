@@ -8,7 +8,7 @@ use crate::flock::rules::{Mean, Rotation, Rule};
 use crate::flock::vectors::{Vectors, distance};
 use crate::material::cells::{Cells, neighbourhood};
 use crate::material::elastic::{Constants, Elastic, Plane};
-use crate::material::weights::MaterialWeights;
+use crate::material::weights::assemble;
 use crate::scene::{Scene, SceneError};
 use crate::solve::equilibrium::{Choice, Request, Solver, solve};
 use crate::solve::linear::system;
@@ -73,9 +73,6 @@ fn stress(overrides: &[&str]) -> Result<Outcome, SceneError> {
     let (Some(cells), Some(elastic)) = (&plan.setup.cells, &scene.material) else {
         return Err(scene.refuse("material", "the body has none", ""));
     };
-    let neighbours = plan.setup.flock.neighbours.clone();
-    let weights = MaterialWeights::assemble(cells, &plan.setup.body, neighbours, elastic)
-        .map_err(|error| scene.refuse("material", error.to_string(), ""))?;
     let reference = &plan.setup.body.reference;
     let strain = [3e-3, -1e-3, 2e-3];
     let displaced: Vectors =
@@ -93,7 +90,7 @@ fn stress(overrides: &[&str]) -> Result<Outcome, SceneError> {
     }
     let largest = pushed.iter().map(|p| distance(p, [0.0; 2])).fold(0.0, f64::max);
     let left = |i: usize| {
-        let ([fx, fy], [px, py]) = (weights.force(i, &displaced), pushed.get(i));
+        let ([fx, fy], [px, py]) = (plan.setup.flock.force_under(i, &displaced), pushed.get(i));
         (fx + px).hypot(fy + py) / largest
     };
     let error = worst((0..reference.len()).map(left));
@@ -134,14 +131,14 @@ fn stretched(solver: Solver, contrast: f64) -> Result<f64, String> {
     let mut cells = Cells::of_body(&body);
     cells.divide(&body.reference, 2, |[x, _]| usize::from(is_middle(x)));
     cells.inclusions.push(sheet(1000.0 * contrast));
-    let weights = MaterialWeights::assemble(&cells, &body, neighbours, &sheet(1000.0));
-    let weights = weights.map_err(|error| error.to_string())?;
+    let weights = assemble(&cells, &body, &neighbours, &sheet(1000.0), Rotation::Small);
+    let weights = Weights::Matrix(weights.map_err(|error| error.to_string())?);
     let end = f64::from(columns - 1);
     let mut flock = Flock::new(
         Rule { mean: Mean::Material { rotation: Rotation::Small }, ..Rule::BARYCENTRE },
         body.reference.clone(),
-        weights.neighbours.clone(),
-        Weights::Matrix(weights.weights()),
+        neighbours,
+        weights,
     );
     flock.keep_rest();
     let follows: Vec<bool> = body.reference.iter().map(|[x, _]| x > 0.0 && x < end).collect();
