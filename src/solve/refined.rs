@@ -52,8 +52,8 @@ pub fn solve_refined(
     let held = |i: usize| if follows(i) { weights.held(i) } else { [true; 2] };
     let off = |u: &Vectors| out_of_balance((flock, &whole), &held, &load, u);
     // Without any force it is no number.
-    let is_balanced = |u: &Vectors| !(off(u) > BALANCED.max(TOLERATED * request.tolerance));
-    if solved.known_to.is_none() && is_balanced(&solved.displacement) {
+    let is_unbalanced = |u: &Vectors| off(u) > BALANCED.max(TOLERATED * request.tolerance);
+    if solved.known_to.is_none() && !is_unbalanced(&solved.displacement) {
         return Ok(solved);
     }
     // What it leaves where something is held, the system does not look at.
@@ -100,7 +100,7 @@ pub fn solve_refined(
     }
     // An iteration does not find what its right-hand side has too little of.
     solved.known_to = solved.known_to.map(|part| part.max(off(&solved.displacement)));
-    solved.converged &= is_balanced(&solved.displacement);
+    solved.converged &= !is_unbalanced(&solved.displacement);
     Ok(solved)
 }
 
