@@ -264,7 +264,8 @@ fn refuse_corotated(scene: &Scene, error: &CorotatedError) -> SceneError {
         }
         CorotatedError::Unsettled { .. } => (
             "equilibrium",
-            "load it less, add a small load in the direction in which it may buckle, or leave [equilibrium] out to step there",
+            "load it less, add a small load in the direction in which it may buckle, go there by [load_steps], or leave [equilibrium] out to step \
+             there",
         ),
         CorotatedError::NotLinear(_) => ("rule", "leave [equilibrium] out to step"),
     };

@@ -107,7 +107,7 @@ fn a_bar_turned_once_around_at_one_end_is_not_at_rest_where_it_began() {
         let way = Way::whole(&held);
         corotated::solve((&bar.flock, &bar.body), follows, axes, &way, &Request::default(), None)
     };
-    for turns in [1.0, -2.0, 11.0, 350.0 / 360.0] {
+    for turns in [1.0, -2.0, 7.0, 11.0, 14.0 + 1.0 / 360.0, 350.0 / 360.0] {
         let reached = match solved(turns) {
             Err(corotated::CorotatedError::Unsettled { part, .. }) => turns.abs() * part,
             other => panic!("{turns} turns: {other:?}"),

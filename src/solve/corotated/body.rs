@@ -13,9 +13,11 @@ use crate::solve::operator::{Operator, OperatorError, Row};
 use crate::solve::order::Order;
 use crate::solve::whole::Whole;
 
-/// Parts of a way at whose ends the force that moves the body is looked at: odd, so that leaders that turn there and back, or
-/// round and round, are not met where they began each time.
+/// Parts of a way at whose ends the force that moves the body is looked at: odd, so that leaders that turn there and back
+/// are not met where they began each time.
 const LOOKS: u32 = 7;
+/// Places on a way that no number of turns has in common: multiples of the golden section, without what is whole of them.
+const GOLDEN: f64 = 0.618_033_988_749_895;
 /// Parts into which a way is cut at most because leaders turn on it.
 const MOST_PARTS: u32 = 1024;
 /// Leaders go straight on enough where twice as many parts of their way are together no longer than this many times \[1\].
@@ -161,29 +163,31 @@ impl Corotated<'_> {
 
     /// The force that moves the body: the largest on the way, since leaders that come back leave none at its end.
     pub fn size(&self) -> f64 {
-        let on_the_way = (0..=LOOKS).map(|k| self.way.part(f64::from(k) / f64::from(LOOKS)));
+        let even = (0..=LOOKS).map(|k| f64::from(k) / f64::from(LOOKS));
+        let on_the_way = even.chain(uneven(LOOKS)).map(|part| self.way.part(part));
         on_the_way.chain([1.0]).map(|part| self.size_at(part)).fold(0.0, f64::max)
     }
 
     /// The largest part of the way on which leaders go straight on, or nearly so: one that turns once round is where it began, and
     /// the body is not.
     pub fn straight_part(&self) -> f64 {
-        let path = |parts: u32| {
-            let place = |k: u32| (self.way.held)(self.way.part(f64::from(k) / f64::from(parts)));
-            let (mut sum, mut last) = (0.0, place(0));
-            for k in 1..=parts {
-                let next = place(k);
+        let along = |parts: &mut dyn Iterator<Item = f64>| {
+            let place = |part: f64| (self.way.held)(self.way.part(part));
+            let (mut sum, mut last) = (0.0, place(0.0));
+            for part in parts.chain([1.0]) {
+                let next = place(part);
                 let moved = |i: usize| distance(next.get(i), last.get(i));
                 sum += self.whole.largest(self.whole.body.owned().map(moved).fold(0.0, f64::max));
                 last = next;
             }
             sum
         };
+        let path = |parts: u32| along(&mut (1..parts).map(|k| f64::from(k) / f64::from(parts)));
         let (mut parts, mut finer) = (1, LOOKS);
         let mut known = path(1);
         while parts < MOST_PARTS {
             let found = path(finer);
-            if found <= STRAIGHT * known {
+            if found <= STRAIGHT * known && along(&mut uneven(finer).into_iter()) <= STRAIGHT * known {
                 break;
             }
             (parts, finer, known) = (finer, 2 * finer, found);
@@ -283,6 +287,13 @@ impl Corotated<'_> {
             None => Ok(ordered(own?).of_part(part.clone())),
         }
     }
+}
+
+/// So many places less one between 0 and 1, in order.
+fn uneven(parts: u32) -> Vec<f64> {
+    let mut places: Vec<f64> = (1..parts).map(|k| (f64::from(k) * GOLDEN).fract()).collect();
+    places.sort_by(f64::total_cmp);
+    places
 }
 
 fn add(sum: &mut [f64; 2], [x, y]: [f64; 2]) {

@@ -16,7 +16,9 @@ const MOST_STEPS: usize = 16;
 /// Steps in a row that do not halve the residual after which rounding is taken to have the last word.
 const STALLED: usize = 2;
 /// Linear systems of a whole way.
-const MOST_SOLVES: usize = 500;
+pub(super) const MOST_SOLVES: usize = 500;
+/// A part of the way that is all of it but for rounding.
+const WHOLE: f64 = 1.0 - 1e-12;
 /// Least part of the way taken at once.
 const LEAST_STRIDE: f64 = 1.0 / 1024.0;
 /// Residual at which the next increment may begin; where rounding leaves more, the part of the displacements that a step is.
@@ -64,7 +66,8 @@ impl<'a> Newton<'a> {
         };
         let mut here = self.rule.stored(start).ok_or_else(|| unsettled(done, self))?;
         while done < 1.0 {
-            let part = f64::min(done + stride.min(longest), 1.0);
+            let next = done + stride.min(longest);
+            let part = if next < WHOLE { next } else { 1.0 };
             let goal = if part == 1.0 { tolerance } else { tolerance.max(ON_THE_WAY) };
             match self.increment(&here, way.part(part), goal) {
                 Ok(Some(next)) => (here, done, stride) = (next, part, 2.0 * stride),
