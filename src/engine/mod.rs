@@ -372,6 +372,7 @@ impl Engine {
             frame.follow(reference, &seen, &mut self.present);
         }
         self.previous.clone_from(&self.present);
+        self.hold_components();
         // A frame stands where the body leaves it, which no solver says.
         self.settled = self.body.frame.is_none().then(|| displacement.clone());
         self.activity.forget();
