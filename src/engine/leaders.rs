@@ -133,6 +133,13 @@ impl Engine {
         }
     }
 
+    /// The rule keeps led components where they are.
+    pub(super) fn hold_components(&mut self) {
+        for (Led { particle, .. }, axis) in &self.led_components {
+            self.flock.hold_at(*particle, *axis, self.present.get(*particle)[*axis]);
+        }
+    }
+
     /// Puts them there after a step: damping leads a rest offset only part of the way.
     pub(super) fn place_components(&mut self) {
         for (led, axis) in &self.led_components {

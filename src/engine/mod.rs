@@ -243,17 +243,19 @@ impl Engine {
         &self.present
     }
 
-    /// Where one particle is from its place in the reference configuration \[length\].
+    /// Where one particle is from its place in the reference configuration \[length\]: to the digits of the solver in a body
+    /// that was put to rest and has not moved since.
     pub fn displacement(&self, particle: usize) -> [f64; 2] {
+        if let Some(settled) = &self.settled {
+            return settled.get(particle);
+        }
         let ([x, y], [px, py]) = (self.present.get(particle), self.body.reference.get(particle));
         [x - px, y - py]
     }
 
-    /// Displacements from the reference configuration \[length\], shape \[count\]: to the digits
-    /// of the solver in a body that was put to rest and has not moved since.
+    /// Those of all, shape \[count\].
     pub fn displacements(&self) -> Vectors {
-        let of = |i| self.displacement(i);
-        self.settled.clone().unwrap_or_else(|| (0..self.present.len()).map(of).collect())
+        (0..self.present.len()).map(|i| self.displacement(i)).collect()
     }
 
     /// Positions before the last step \[length, world frame\], shape \[count\].
@@ -372,6 +374,7 @@ impl Engine {
             frame.follow(reference, &seen, &mut self.present);
         }
         self.previous.clone_from(&self.present);
+        self.hold_components();
         // A frame stands where the body leaves it, which no solver says.
         self.settled = self.body.frame.is_none().then(|| displacement.clone());
         self.activity.forget();

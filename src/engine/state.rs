@@ -178,6 +178,7 @@ impl<'a> EngineState<'a> {
         engine.conduct_until_now();
         self.require_fits(&engine)?;
         engine.follow_ramp();
+        engine.move_components();
         engine.present = self.present.into_owned();
         engine.previous = self.previous.into_owned();
         engine.roles = self.roles.into_owned();

@@ -332,11 +332,13 @@ impl Flock {
     }
 
     /// Holds one component of a particle at a place \[length\], if there are rest offsets; where the rule's rows are the same
-    /// however the body turns, the free one is in balance with that.
+    /// however the body turns, the other one is in balance with that if it is free.
     pub(crate) fn hold_at(&mut self, particle: usize, axis: usize, place: f64) {
         let Some(mut offset) = self.rest.as_ref().map(|rest| rest.get(particle)) else { return };
         offset[axis] = self.rule.held_offset(place, self.reference.get(particle)[axis]);
-        if let (SMALL, Weights::Matrix(weights)) = (self.rule.mean, &self.weights) {
+        if let (SMALL, Weights::Matrix(weights)) = (self.rule.mean, &self.weights)
+            && !weights.held(particle)[1 - axis]
+        {
             let reference = self.reference.get(particle);
             let unmoved = self.rule.rest_offset(reference, self.seen(particle, &self.reference));
             offset[1 - axis] =

@@ -321,8 +321,11 @@ impl Session for Swarm {
     fn exactness(&self) -> Option<Vec<String>> {
         let formation = self.flight().control().formation();
         let exactness = Exactness::of(self.swarm(), formation).map(|exactness| exactness.in_words());
-        let unknown =
-            || vec!["what becomes of manoeuvres is not predicted: the rule is not linear".to_owned()];
+        let follows = (0..formation.count()).any(|m| !formation.leads(m));
+        let unknown = || {
+            let words = "what becomes of manoeuvres is not predicted: the rule is not linear";
+            follows.then(|| words.to_owned()).into_iter().collect()
+        };
         formation.is_led_here().then(|| exactness.unwrap_or_else(unknown))
     }
 

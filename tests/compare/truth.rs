@@ -165,3 +165,21 @@ fn planes_of_symmetry_hold_one_component() {
         assert!((0..2).all(|k| (u[k] - exact[k]).abs() < 1e-9), "({x}, {y}): {u:?}, not {exact:?}");
     }
 }
+
+/// Displacements far below the rounding of places are the solver's too.
+#[test]
+fn the_error_of_a_linear_body_does_not_depend_on_the_size_of_its_load() {
+    let [heavy, light] = [1.0, 1e-14].map(|size| {
+        let load = format!(
+            "loads=[{{ kind = \"traction\", region = {{ kind = \"edge\", side = \"right\" }}, traction = [0.0, {:?}] }}]",
+            -0.1 * size
+        );
+        let found = compared("beam-loaded", &[&load, "record.places=[[15.3, 12.1]]"]);
+        let of = &found.comparison;
+        let [ux, uy] = found.places[0].rule.displacement.map(|along| along / size);
+        [of.displacement_rel_l2, of.von_mises_rel_l2, of.energy_rel, ux, uy]
+    });
+    for (heavy, light) in heavy.iter().zip(light) {
+        assert!((light / heavy - 1.0).abs() < 1e-6, "{heavy} and {light}");
+    }
+}

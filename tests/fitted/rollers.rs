@@ -2,10 +2,15 @@
 
 use std::ops::ControlFlow;
 
+use flockform::continuum::equilibrium::run_to_equilibrium;
 use flockform::continuum::mechanics::Mechanics;
 use flockform::continuum::plan::Plan;
-use flockform::continuum::run::{Outcome, run};
+use flockform::continuum::run::{Outcome, run, run_shared};
+use flockform::engine::Engine;
+use flockform::engine::observer::EachStep;
+use flockform::engine::state::EngineState;
 use flockform::flock::vectors::distance;
+use flockform::ranks::Team;
 use flockform::scene::Scene;
 
 use crate::scenes::load;
@@ -116,6 +121,73 @@ fn a_led_component_is_where_its_motion_says() {
             ControlFlow::Continue(())
         });
         assert_eq!(outcome.engine.step(), 90, "{sets:?}");
+    }
+}
+
+/// A square of side 1 and modulus 1 stretched by 0.1 % along x, along y as well if so, by its edges; the corner between is led by both.
+fn stretched(both: bool, sets: &[&str]) -> (Scene, Plan) {
+    let entry = |side: &str, axis: &str, role: &str| {
+        format!("{{ region = {{ kind = \"edge\", side = \"{side}\" }}, axis = \"{axis}\", role = {role} }}")
+    };
+    let led = |by: &str| {
+        format!(
+            "\"leader\", motion = {{ kind = \"keyframes\", frames = [{{ step = 100, displacement = {by} }}] }}"
+        )
+    };
+    let mut roles = vec![
+        entry("left", "x", "\"clamped\""),
+        entry("bottom", "y", "\"clamped\""),
+        entry("right", "x", &led("[1e-3, 0.0]")),
+    ];
+    roles.extend(both.then(|| entry("top", "y", &led("[0.0, 1e-3]"))));
+    let text = format!(
+        "title = \"stretched\"\nrule = {{ mean = {{ kind = \"material\" }} }}\nstop = {{ steps = 3000 }}\n\
+         body = {{ shape = {{ kind = \"rectangle\", max = [1.0, 1.0] }} }}\nlattice = {{ kind = \"square\", spacing = 0.25 }}\n\
+         material = {{ kind = \"isotropic\", young = 1.0, poisson = 0.3 }}\nroles = [{}]\n",
+        roles.join(", ")
+    );
+    let sets: Vec<String> = sets.iter().map(|&set| set.to_owned()).collect();
+    let scene = Scene::parse("stretched", "stretched.toml", &text, &sets, None)
+        .unwrap_or_else(|error| panic!("{error}"));
+    let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
+    (scene, plan)
+}
+
+/// How far the force on the edge that is led along x is from that of uniform stress, over it.
+fn off_uniform(both: bool, outcome: &Outcome) -> f64 {
+    let expected = if both { 1e-3 / 0.7 } else { 1e-3 };
+    (measured(outcome).reactions[2].force[0] / expected - 1.0).abs()
+}
+
+#[test]
+fn components_that_have_been_led_stay_where_they_are_a_corner_along_both_axes_and_resumed_too() {
+    for both in [false, true] {
+        let mut kept = None;
+        let outcome = run(stretched(both, &[]).1, &mut |engine, residual| {
+            if engine.step() == 1000 {
+                kept = Some((EngineState::of(engine).into_owned(), residual));
+            }
+            ControlFlow::Continue(())
+        });
+        assert!(off_uniform(both, &outcome) < 1e-9, "{both}: {:?}", measured(&outcome).reactions);
+        let mut see = |_: &Engine, _: f64| ControlFlow::Continue(());
+        let resumed = run_shared(stretched(both, &[]).1, kept, None::<&Team>, &mut EachStep(&mut see));
+        let resumed = resumed.expect("the same body");
+        let all = outcome.engine.present().iter().zip(resumed.engine.present().iter());
+        assert!(all.into_iter().all(|(a, b)| a.map(f64::to_bits) == b.map(f64::to_bits)), "{both}");
+    }
+}
+
+#[test]
+fn an_equilibrium_under_led_components_leaves_no_residual() {
+    for both in [false, true] {
+        for sets in [&[][..], &[COROTATED], &["load_steps.schedule=[0.5, 1.0]"]] {
+            let (scene, plan) = stretched(both, &[&["equilibrium={ tolerance = 1e-12 }"], sets].concat());
+            let outcome = run_to_equilibrium(&scene, plan, &mut |_, _| ControlFlow::Continue(()));
+            let outcome = outcome.unwrap_or_else(|error| panic!("{error}"));
+            assert!(off_uniform(both, &outcome) < 1e-3, "{both}, {sets:?}");
+            assert!(outcome.residual < 1e-12, "{both}, {sets:?}: {:e}", outcome.residual);
+        }
     }
 }
 

@@ -154,6 +154,7 @@ fn a_designer_is_told_which_manoeuvres_are_exact() {
     assert!(told(&live).contains("exactly in every shift of the leaders"), "{}", told(&live));
     assert!(told(&live).contains("`turn`: followers up to"), "{}", told(&live));
     assert_eq!(begun("bridge", &[]).exactness(), None);
+    assert_eq!(begun("antipodal", &[]).exactness(), Some(Vec::new()), "all lead");
 }
 
 fn edits() -> impl Strategy<Value = Edit> {

@@ -135,7 +135,7 @@ pub fn compare(
     let time = start.elapsed();
 
     let engine = &outcome.engine;
-    let rule: Vectors = (0..engine.body().count()).map(|i| engine.displacement(i)).collect();
+    let rule = engine.displacements();
     let followed = |(i, &role): (usize, &Role)| role == Role::Follower && truth.solution.knows(i);
     let follows: Vec<bool> = engine.roles().iter().enumerate().map(followed).collect();
     let (elastic, known) = (&truth.elastic, &truth.solution.displacement);

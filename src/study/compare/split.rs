@@ -74,8 +74,7 @@ fn equilibrium(scene: &Scene, truth: &Reference) -> Option<Vectors> {
     let request = Request { tolerance: TIGHT, precision: Precision::F64, ..Request::default() };
     let outcome = solve_equilibrium(scene, &request, plan_led_by(scene, truth).ok()?).ok()?;
     let is_known = outcome.solved.as_ref().is_some_and(|solved| solved.is_at_rest());
-    let engine = &outcome.engine;
-    is_known.then(|| (0..engine.body().count()).map(|i| engine.displacement(i)).collect())
+    is_known.then(|| outcome.engine.displacements())
 }
 
 /// The outline of the shape, and that of its cells.

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::not_linear;
 use crate::flock::manoeuvre::{Affine, Posture};
+use crate::flock::role::Role;
 use crate::flock::rounding::ROUNDING;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::swarm::Swarm;
@@ -40,10 +41,11 @@ pub struct ManoeuvreError {
 }
 
 impl Exactness {
-    /// `None` where the rule is not linear, no program of the swarm leads, or the followers are too many.
+    /// `None` where the rule is not linear, no program of the swarm leads, nothing follows, or the followers are too many.
     pub fn of(swarm: &Swarm, formation: &Formation) -> Option<Self> {
         let about = formation.middle();
         let is_led = formation.is_led_here() && (0..formation.count()).any(|m| formation.is_led(m));
+        let is_led = is_led && (0..formation.count()).any(|m| !formation.leads(m));
         (is_led && not_linear(formation, swarm).is_none())
             .then(|| formation.settled(&formation.places))??;
         let is_exact = |postures: &[Posture]| {
@@ -63,6 +65,27 @@ impl Exactness {
         let manoeuvres = formation.manoeuvres.iter().filter_map(|one| on_the_way(formation, &one.name));
         Some(Self { exact, manoeuvres: manoeuvres.collect(), needed })
     }
+
+    /// Whether there are manoeuvres and followers keep their places in each.
+    pub(super) fn is_every_manoeuvre_exact(&self) -> bool {
+        !self.manoeuvres.is_empty() && self.manoeuvres.iter().all(|one| one.largest == 0.0)
+    }
+}
+
+/// Whether a shift of all robots along an axis takes the targets of all followers along, so that they come to rest where it has their
+/// places.
+pub(super) fn keeps_to_shift(formation: &Formation, axis: usize) -> bool {
+    let Some(engine) = formation.engine() else { return false };
+    let (flock, reference) = (engine.flock(), &engine.body().reference);
+    // So far that the rounding of places far from the origin is little of it.
+    let way = formation.spacing() + reference.iter().map(|p| distance(p, [0.0; 2])).fold(0.0, f64::max);
+    let along = |[x, y]: [f64; 2]| if axis == 0 { [x + way, y] } else { [x, y + way] };
+    let shifted: Vectors = reference.iter().map(along).collect();
+    let is_off = |i: usize| {
+        let (unmoved, moved) = (flock.target(i, reference), flock.target(i, &shifted));
+        distance(along(unmoved), moved) > ROUNDING * way
+    };
+    !engine.roles().iter().enumerate().any(|(i, &role)| role == Role::Follower && is_off(i))
 }
 
 fn needed(formation: &Formation) -> Vec<Needed> {

@@ -7,11 +7,13 @@
 //!   its `d + 1`st root, which is below 1 as well: delay slows the formation and never makes it grow;
 //! * noise of the poses moves a follower by the root of the diagonal of `C = A C A' + A A' + B B'` times that noise;
 //! * behind leaders that move steadily a follower lags by the row `n` of `(1 - A)^-1 (A + B) 1` times their way in a period,
-//!   `d + 1` times that under a delay of `d` periods;
+//!   `d + 1` times that under a delay of `d` periods, if a shift of all takes all targets along: `(A + B + D) 1 = 1`. Otherwise it
+//!   is farther behind the farther they go, and has no lag;
 //! * where each robot is kept a way `b` behind its target, in which it could brake, it is `n b` farther behind the leaders,
 //!   and `(n + 1) b` behind their program, behind which they are themselves.
 //!
-//! For many followers, or with a frame, which remembers, the lag is that of the loop itself, run until it is steady.
+//! For many followers, or with a frame, which remembers, the lag is that of the loop itself, run until it is steady. A frame's memory
+//! is none of the poses, so there the loop is run with the delay.
 //!
 //! A loop that is not linear has no such map, and nothing of this is stated of it.
 
@@ -35,6 +37,7 @@ use crate::solve::spectrum::LinearSweep;
 use crate::swarm::flight::Flight;
 use crate::swarm::robots::DoubleIntegrator;
 use crate::swarm::safety::Limits;
+use exactness::keeps_to_shift;
 pub use exactness::{Exactness, ManoeuvreError};
 use period_map::{PeriodMap, lag_when_led};
 
@@ -46,6 +49,9 @@ const LEAST_LAG: f64 = 1e-3;
 
 /// The reason for which no lag is known of followers that are never in their places.
 const NEVER_STEADY: &str = "disturbances do not die out";
+
+/// The reason for which no lag is known of followers that fall behind, or aside, by more and more.
+const NOT_KEPT: &str = "followers do not keep to a shift of the leaders";
 
 /// Standard deviations of noise that each robot keeps farther away from everything.
 const DEVIATIONS_KEPT: f64 = 3.0;
@@ -179,9 +185,10 @@ impl SwarmPlan {
         }
         .map_err(|why| if leaders == formation.count() { "every robot leads" } else { why });
         let map = PeriodMap::of(formation, raw.control.sweeps).filter(|_| not_linear.is_none());
-        let lag = lag(swarm, formation, map.as_ref(), predicted);
+        let exactness = Exactness::of(swarm, formation);
+        let lag = lag(swarm, formation, map.as_ref(), predicted, exactness.as_ref());
         let convergence = predicted.ok();
-        let delay = f64::from(raw.flight.delay) + f64::from(raw.flight.jitter);
+        let delay = f64::from(longest_delay(swarm));
         let mut plan = Self {
             name: swarm.name.clone(),
             title: raw.title.clone(),
@@ -207,8 +214,8 @@ impl SwarmPlan {
                 room_s: room_for_delay(formation, flight.control().limits()),
                 half_life_s: convergence.and_then(|one| Some(one.half_life_s? * (delay + 1.0))),
             },
-            speed: speed(swarm, &flight, lag, delay),
-            exactness: Exactness::of(swarm, formation),
+            speed: speed(swarm, &flight, lag),
+            exactness,
             not_predicted: predicted.err(),
             convergence,
             cautions: Vec::new(),
@@ -293,41 +300,71 @@ fn half_life(factor: f64) -> f64 {
     (0.5_f64.ln() / factor.max(f64::MIN_POSITIVE).ln()).max(1.0)
 }
 
-/// The largest lag of a follower behind leaders that move steadily, as periods without a delay \[1\]; the reason for which it is not
-/// known.
+/// Periods by which poses are late at most in the simulated flight.
+fn longest_delay(swarm: &Swarm) -> u32 {
+    swarm.raw.flight.delay + swarm.raw.flight.jitter
+}
+
+/// The largest lag of a follower behind leaders that move steadily.
+#[derive(Clone, Copy)]
+struct Lag {
+    /// Without a delay \[period\].
+    prompt: f64,
+    /// Under the simulated one \[period\].
+    delayed: f64,
+}
+
+/// The lag, or the reason for which it is not known.
 fn lag(
     swarm: &Swarm,
     formation: &Formation,
     map: Option<&PeriodMap>,
     convergence: Result<Convergence, &'static str>,
-) -> Result<f64, &'static str> {
+    exactness: Option<&Exactness>,
+) -> Result<Lag, &'static str> {
     if formation.is_led_here() && (0..formation.count()).all(|m| formation.leads(m)) {
-        return Ok(0.0);
+        return Ok(Lag { prompt: 0.0, delayed: 0.0 });
     }
     let Convergence { factor, .. } = convergence?;
     // 1 - A has an inverse where disturbances grow too, but no lag comes of it.
     if factor >= 1.0 {
         return Err(NEVER_STEADY);
     }
-    match map {
-        Some(map) => map.lag().ok_or(NEVER_STEADY),
-        None => lag_when_led(formation, swarm.raw.control.sweeps, factor)
-            .ok_or("it would take long to compute for so many robots"),
-    }
+    let axes = followed_axes(formation, exactness).ok_or(NOT_KEPT)?;
+    let delay = longest_delay(swarm);
+    let led = |delay| lag_when_led((formation, swarm.raw.control.sweeps), axes, factor, delay);
+    let prompt = match map {
+        Some(map) => map.lag(axes).ok_or(NEVER_STEADY)?,
+        None => led(0).ok_or("it would take long to compute for so many robots")?,
+    };
+    let has_frame = formation.engine().is_some_and(|engine| engine.body().frame.is_some());
+    let run = if has_frame && delay > 0 { led(delay) } else { None };
+    Ok(Lag { prompt, delayed: run.unwrap_or(prompt * (f64::from(delay) + 1.0)) })
 }
 
-fn speed(swarm: &Swarm, flight: &Flight, lag: Result<f64, &'static str>, delay: f64) -> SpeedMargin {
+/// The axes along which leaders go and followers keep to a shift of theirs; `None` where leaders may go another way too.
+fn followed_axes(formation: &Formation, exactness: Option<&Exactness>) -> Option<[bool; 2]> {
+    let axes = [0, 1].map(|axis| keeps_to_shift(formation, axis));
+    // A term across one axis alone shows in no manoeuvre along the other one.
+    let is_led_along = || {
+        let are_exact = exactness.is_some_and(Exactness::is_every_manoeuvre_exact);
+        axes != [false; 2] && formation.affine(0.0).is_some() && are_exact
+    };
+    (axes == [true; 2] || is_led_along()).then_some(axes)
+}
+
+fn speed(swarm: &Swarm, flight: &Flight, lag: Result<Lag, &'static str>) -> SpeedMargin {
     let (raw, formation) = (&swarm.raw, flight.control().formation());
     let (limit, bound, period) = (raw.limits.speed, raw.flight.bounds.affine_error, raw.control.period);
     let follow = (0..formation.count()).any(|m| !formation.leads(m));
     let lags = lag.ok().filter(|_| follow);
     let braking = raw.limits.acceleration.zip(lags);
-    let in_time = |periods: f64| periods * (delay + 1.0) * period;
+    let in_time = |lag: Lag| lag.delayed * period;
     let reachable = match (bound, lag) {
         (None, _) => limit,
         (Some(_), Err(_)) => None,
-        (Some(error), Ok(periods)) => {
-            let by_lag = reachable(error, in_time(periods), periods + 1.0, flight.control().limits(), period);
+        (Some(error), Ok(lag)) => {
+            let by_lag = reachable(error, in_time(lag), lag.prompt + 1.0, flight.control().limits(), period);
             [limit, by_lag].into_iter().flatten().reduce(f64::min)
         }
     };
@@ -335,10 +372,10 @@ fn speed(swarm: &Swarm, flight: &Flight, lag: Result<f64, &'static str>, delay: 
         limit,
         lag_s: lags.map(in_time),
         lag_not_known: lag.err(),
-        lag_per_speed: braking.map(|(most, periods)| periods / (2.0 * most)),
+        lag_per_speed: braking.map(|(most, lag)| lag.prompt / (2.0 * most)),
         least_braking_lag_s: braking
             .filter(|_| flight.control().limits().brakes)
-            .map(|(_, periods)| 0.5 * periods * period),
+            .map(|(_, lag)| 0.5 * lag.prompt * period),
         bound,
         reachable,
         manoeuvres: swarm.manoeuvres.iter().filter_map(|one| needed(formation, &one.name)).collect(),

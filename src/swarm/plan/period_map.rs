@@ -64,22 +64,36 @@ impl PeriodMap {
         None
     }
 
-    /// The largest lag of a follower behind leaders that move by 1 in a period \[period\].
-    pub(super) fn lag(&self) -> Option<f64> {
+    /// The largest lag of a follower behind leaders that move by 1 in a period along any of these axes \[period\].
+    pub(super) fn lag(&self, axes: [bool; 2]) -> Option<f64> {
         let size = self.own.nrows();
         let along = |axis: usize| {
             let ones = |n: usize| DVector::from_fn(n, |k, _| if k % 2 == axis { 1.0 } else { 0.0 });
             let seen = &self.own * ones(size) + &self.led * ones(self.led.ncols());
             (DMatrix::identity(size, size) - &self.own).lu().solve(&seen).map(|lag| lag.amax())
         };
-        Some(along(0)?.max(along(1)?)).filter(|lag| lag.is_finite())
+        largest(axes, along)
     }
 }
 
-/// The largest lag of a follower behind leaders that move by 1 in a period \[period\], by leading the formation until its lag is steady:
-/// it forgets all but `factor` of what it lacks of that in a period. `None` where that takes long.
-pub(super) fn lag_when_led(formation: &Formation, sweeps: usize, factor: f64) -> Option<f64> {
-    let periods = (STEADY.ln() / factor.max(f64::MIN_POSITIVE).ln()).ceil() + 1.0;
+/// The largest of the lags along these axes; `None` where one is not known.
+fn largest(axes: [bool; 2], along: impl Fn(usize) -> Option<f64>) -> Option<f64> {
+    let all: Option<Vec<f64>> = (0..2).filter(|&axis| axes[axis]).map(along).collect();
+    all?.into_iter().reduce(f64::max).filter(|lag| lag.is_finite())
+}
+
+/// The largest lag of a follower behind leaders that move by 1 in a period along any of these axes \[period\], by leading the formation
+/// until its lag is steady: it forgets all but `factor` of what it lacks of that in a period, or in one and as many as poses are late by,
+/// `delay`. `None` where that takes long.
+pub(super) fn lag_when_led(
+    (formation, sweeps): (&Formation, usize),
+    axes: [bool; 2],
+    factor: f64,
+    delay: u32,
+) -> Option<f64> {
+    let late = delay as usize + 1;
+    let forgotten = (STEADY.ln() / factor.max(f64::MIN_POSITIVE).ln()).ceil();
+    let periods = (forgotten + 1.0) * late as f64;
     if periods * (sweeps * formation.count()) as f64 > MOST_TARGETS {
         return None;
     }
@@ -92,21 +106,22 @@ pub(super) fn lag_when_led(formation: &Formation, sweeps: usize, factor: f64) ->
             place
         };
         let all = vec![true; formation.count()];
-        let mut present = places.clone();
-        let mut targets = present.clone();
+        // The last ones, of which the oldest are seen.
+        let mut present = vec![places.clone(); late];
+        let mut targets = places.clone();
         for period in 1..=periods as usize {
             for m in 0..formation.count() {
                 // Of the leaders alone.
                 formation.take_over(m, moved(m, pace * period as f64), 0.0);
             }
-            let seen = Seen { present: &present, known: &all };
-            formation.advance(&seen, &mut [], 0.0, sweeps, &mut targets);
+            let present = &mut present[period % late];
+            formation.advance(&Seen { present, known: &all }, &mut [], 0.0, sweeps, &mut targets);
             present.clone_from(&targets);
         }
-        let behind = |m: usize| distance(moved(m, pace * periods), present.get(m)) / pace;
-        (0..formation.count()).map(behind).fold(0.0, f64::max)
+        let behind = |m: usize| distance(moved(m, pace * periods), targets.get(m)) / pace;
+        Some((0..formation.count()).map(behind).fold(0.0, f64::max))
     };
-    Some(along(0).max(along(1))).filter(|lag| lag.is_finite())
+    largest(axes, along)
 }
 
 /// The members' places after a period at whose start one of them is seen a metre off.

@@ -361,6 +361,18 @@ fn solved_weights_follow_every_affine_motion_and_equal_ones_shifts_alone() {
 }
 
 #[test]
+fn where_nothing_follows_nothing_is_said_of_followers() {
+    let text = "title = \"one\"\nrobots = [{ name = \"a\", place = [0.0, 0.0] }]\n\
+                links = { kind = \"nearest\", count = 1 }\n\
+                leaders = [{ robots = [\"a\"], program = { kind = \"external\" } }]\n";
+    let swarm = Swarm::parse("one", "one.toml", text, &[], None).unwrap_or_else(|e| panic!("{e}"));
+    let plan = SwarmPlan::new(&swarm).expect("laid out");
+    assert_eq!(plan.exactness, None);
+    let words = plan.to_string();
+    assert!(!words.contains("exact") && !words.contains("lost"), "{words}");
+}
+
+#[test]
 fn followers_are_nowhere_on_the_way_farther_off_than_the_plan_says() {
     let turn = "manoeuvres=[{ name = \"turn\", legs = [{ seconds = 70.0, rotate = 250.0 }] }]";
     let set = ["rule={ rest = \"balanced\" }", turn].map(str::to_owned);

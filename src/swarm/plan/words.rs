@@ -143,7 +143,7 @@ impl Exactness {
     /// The motions that are followed exactly, and how far each manoeuvre is from that, a line each.
     pub fn in_words(&self) -> Vec<String> {
         let exact = match &self.exact[..] {
-            [] => "no motion of the leaders is followed exactly".to_owned(),
+            [] => "no kind of motion of the leaders is followed exactly in all directions".to_owned(),
             exact => format!("followers take part exactly in every {} of the leaders", exact.join(", ")),
         };
         let of_one = |ManoeuvreError { name, largest }: &ManoeuvreError| match largest {

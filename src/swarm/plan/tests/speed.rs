@@ -79,7 +79,8 @@ fn a_lag_that_is_steady_when_led_is_that_of_the_map_and_one_of_many_robots_is_kn
         let plan = SwarmPlan::new(&swarm).expect("laid out");
         let flight = Flight::new(&swarm).expect("laid out");
         let factor = plan.convergence.expect("linear").factor;
-        let led = lag_when_led(flight.control().formation(), plan.sweeps, factor).expect("short");
+        let led =
+            lag_when_led((flight.control().formation(), plan.sweeps), [true; 2], factor, 0).expect("short");
         let lag = plan.speed.lag_s.expect("linear") / plan.period_s;
         assert!((led / lag - 1.0).abs() < 1e-5, "{led} {lag}");
     }
@@ -105,6 +106,52 @@ fn followers_whose_disturbances_grow_have_no_lag_however_few_they_are() {
         let SpeedMargin { lag_s, lag_not_known, reachable, .. } = plan.speed;
         assert_eq!((lag_s, lag_not_known, reachable), (None, Some(NEVER_STEADY), None), "{set:?}");
     }
+}
+
+#[test]
+fn followers_that_do_not_keep_to_a_shift_have_neither_lag_nor_reachable_speed() {
+    let initial = "rule.feedback={ factor = -0.3, reference = \"initial\" }";
+    let poisson = |axis: &str| format!("rule.poisson={{ k = 0.3, axis = \"{axis}\" }}");
+    let [x, y] = ["x", "y"].map(poisson);
+    let legs = |way: &str| format!("manoeuvres=[{{ name = \"on\", legs = [{{ seconds = 40.0, {way} }}] }}]");
+    let [across, turned] = ["translate = [0.0, 1.0]", "rotate = 5.0"].map(legs);
+    let path = "leaders[0].program={ kind = \"path\", points = [{ at = 40.0, displacement = [1.0, 0.0] }] }";
+    let many = [&MANY[..], &[initial]].concat();
+    let led = [&*y, path, "flight.bounds={}"];
+    let cases: [&[&str]; 6] = [&[initial], &many, &[&x], &[&y, &across], &[&y, &turned], &led];
+    for set in cases {
+        let plan = SwarmPlan::new(&led_on(set)).expect("laid out");
+        let SpeedMargin { lag_s, lag_not_known, reachable, bound, .. } = plan.speed;
+        assert_eq!((lag_s, lag_not_known), (None, Some(NOT_KEPT)), "{set:?}");
+        assert!(bound.is_none() || reachable.is_none(), "{set:?}");
+        let words = plan.to_string();
+        assert!(
+            words.contains("lag               not computed: followers do not keep to a shift of"),
+            "{words}"
+        );
+    }
+    // Behind leaders that go the way that the term does not look at they keep to it.
+    for set in [&[&*y][..], &[&x, &across]] {
+        let speed = SwarmPlan::new(&led_on(set)).expect("laid out").speed;
+        let without = SwarmPlan::new(&led_on(&[])).expect("laid out").speed;
+        assert!(
+            (speed.lag_s.expect("known") / without.lag_s.expect("known") - 1.0).abs() < 1e-9,
+            "{speed:?}"
+        );
+    }
+    // However far from the origin.
+    let [min, max] = [0.0, 6.0].map(|by| format!("[{:?}, {:?}]", 5e6 + by, 1e6 + by));
+    let far = format!("body.shape={{ kind = \"rectangle\", min = {min}, max = {max} }}");
+    let far = [&far[..], "poses.range=1e8"];
+    assert!(SwarmPlan::new(&led_on(&far)).expect("laid out").speed.lag_s.is_some());
+}
+
+#[test]
+fn the_memory_of_a_frame_is_not_delayed_with_the_poses() {
+    let set = ["frame=\"lagged\"", "flight.delay=2", MANY[1], "control.sweeps=10"];
+    let reachable = SwarmPlan::new(&led_on(&set)).expect("laid out").speed.reachable.expect("bounded");
+    let error = error_at(reachable, &set);
+    assert!((0.98..1.005).contains(&error), "{error} of the bound at {reachable} m/s");
 }
 
 #[test]
