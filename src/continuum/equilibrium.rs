@@ -16,6 +16,7 @@ use crate::engine::state::EngineState;
 use crate::flock::role::Role;
 use crate::flock::rules::{FeedbackReference, Rule};
 use crate::flock::vectors::{Vectors, distance};
+use crate::material::elastic::Elastic;
 use crate::ranks::Team;
 use crate::scene::{LoadSteps, Scene, SceneError};
 use crate::solve::corotated::{self, CorotatedError, Way};
@@ -239,14 +240,11 @@ fn of_plan_after(scene: &Scene, plan: &Plan, steps: f64) -> Result<System, Scene
     Ok(system)
 }
 
-/// Poisson's ratio in plane strain above which iterations are many.
-const NEAR_A_HALF: f64 = 0.49;
-
 /// Whether the body's material, or that of one of its inclusions, hardly changes its volume.
 pub(super) fn is_nearly_incompressible(scene: &Scene) -> bool {
     let inclusions = scene.inclusions.iter().map(|part| &part.material);
     let mut all = scene.material.iter().chain(inclusions);
-    all.any(|part| part.poisson_in_plane_strain().is_some_and(|poisson| poisson > NEAR_A_HALF))
+    all.any(Elastic::is_nearly_incompressible)
 }
 
 fn refuse_corotated(scene: &Scene, error: &CorotatedError) -> SceneError {

@@ -151,7 +151,7 @@ fn followers(plan: &Plan) -> usize {
 /// The part of the cells whose dilatation is averaged with that of others, so that particles feel each other across two cells \[1\].
 fn share_of_wide_rows(plan: &Plan) -> f64 {
     let Setup { cells: Some(cells), elastic: Some(elastic), .. } = &plan.setup else { return 0.0 };
-    let is_wide = |cell: &usize| cells.material_of(*cell, elastic).averaged_dilatation().is_some();
+    let is_wide = |cell: &usize| cells.material_of(*cell, elastic).averaged().is_some();
     (0..cells.count()).filter(is_wide).count() as f64 / cells.count().max(1) as f64
 }
 

@@ -58,7 +58,7 @@ fn is_laid_out_otherwise(scene: &Scene, changed: &Scene) -> bool {
 /// Whether a material of the body is so close to incompressible that its dilatations are averaged over cells.
 pub(super) fn averages_dilatations(scene: &Scene) -> bool {
     let mut materials = scene.material.iter().chain(scene.inclusions.iter().map(|part| &part.material));
-    materials.any(|elastic| elastic.averaged_dilatation().is_some())
+    materials.any(|elastic| elastic.averaged().is_some())
 }
 
 /// Which columns of a body are whose.

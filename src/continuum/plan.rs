@@ -321,7 +321,8 @@ fn other_layout(
     let why = if averages_dilatations(scene) == averages_dilatations(changed) {
         ""
     } else {
-        ": above a Poisson's ratio of 0.4 (2/3 in plane stress) dilatations are averaged over more of them"
+        ": above a Poisson's ratio of 0.4 (2/3 in plane stress) dilatations are averaged over more of them, as is what an orthotropic \
+         material resists far more than all else"
     };
     Err(format!("{OTHER_BODY}{why}"))
 }

@@ -22,6 +22,7 @@ pub struct CellsAround {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Patch {
     stiffness: f64,
+    weights: [f64; 3],
     /// Where its cells begin and end in `patch_cells`.
     cells: [u32; 2],
 }
@@ -55,15 +56,19 @@ impl CellsAround {
         self.slots.extend(slots);
     }
 
-    /// Adds a patch to the class at hand: its stiffness \[force / length^3\], and its cells: kind, share of area
-    /// \[length^2\] and corners.
-    pub(crate) fn push_patch(&mut self, stiffness: f64, cells: impl Iterator<Item = (u32, f64, Vec<u32>)>) {
+    /// Adds a patch to the class at hand: its stiffness \[force / length^3\] and [`PatchCell::weights`], and its cells: kind, share of
+    /// area \[length^2\] and corners.
+    pub(crate) fn push_patch(
+        &mut self,
+        (stiffness, weights): (f64, [f64; 3]),
+        cells: impl Iterator<Item = (u32, f64, Vec<u32>)>,
+    ) {
         let begin = self.patch_cells.len() as u32;
         for (element, share, slots) in cells {
             self.patch_cells.push(PatchPart { element, corners: self.slots.len() as u32, share });
             self.slots.extend(slots);
         }
-        self.patches.push(Patch { stiffness, cells: [begin, self.patch_cells.len() as u32] });
+        self.patches.push(Patch { stiffness, weights, cells: [begin, self.patch_cells.len() as u32] });
     }
 
     /// Ends the class at hand.
@@ -84,12 +89,12 @@ impl CellsAround {
         &self,
         class: usize,
     ) -> impl Iterator<Item = (f64, impl Iterator<Item = PatchCell<'_>> + Clone)> + Clone {
-        self.patches[range(&self.patch_starts, class)].iter().map(|patch| {
+        self.patches[range(&self.patch_starts, class)].iter().map(move |patch| {
             let cells = &self.patch_cells[patch.cells[0] as usize..patch.cells[1] as usize];
-            let cell = |cell: &PatchPart| {
+            let cell = move |cell: &PatchPart| {
                 let element = &self.elements[cell.element as usize];
                 let slots = &self.slots[cell.corners as usize..][..element.corners()];
-                PatchCell { element, share: cell.share, slots }
+                PatchCell { element, share: cell.share, weights: patch.weights, slots }
             };
             (patch.stiffness, cells.iter().map(cell))
         })

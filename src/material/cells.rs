@@ -177,9 +177,9 @@ impl Cells {
         self.material(self.kind[cell] as usize, body)
     }
 
-    /// Whether dilatations are averaged over cells anywhere ([`Elastic::averaged_dilatation`]).
+    /// Whether dilatations are averaged over cells anywhere ([`Elastic::averaged`]).
     pub fn average_dilatations(&self, body: &Elastic) -> bool {
-        std::iter::once(body).chain(&self.inclusions).any(|part| part.averaged_dilatation().is_some())
+        std::iter::once(body).chain(&self.inclusions).any(|part| part.averaged().is_some())
     }
 
     /// Divides whole cells of a lattice into regions, by the middle of each \[length\].
@@ -263,7 +263,7 @@ impl Cells {
     }
 
     /// For each of `particles` particles those that it feels in this material, in order of index: those it shares a cell
-    /// with, and where dilatations are averaged over cells ([`Elastic::averaged_dilatation`]) their cell_neighbours as well.
+    /// with, and where dilatations are averaged over cells ([`Elastic::averaged`]) their cell_neighbours as well.
     pub fn neighbours(&self, particles: usize, elastic: &Elastic) -> Neighbours {
         let cell_neighbours = self.cell_neighbours(particles);
         if !self.average_dilatations(elastic) {
@@ -359,9 +359,9 @@ pub fn neighbourhood(lattice: &Lattice) -> Neighbourhood {
 }
 
 /// The neighbourhood that this material needs: [`neighbourhood`], and the cell_neighbours of those as well where dilatations are
-/// averaged over cells ([`Elastic::averaged_dilatation`]).
+/// averaged over cells ([`Elastic::averaged`]).
 pub fn neighbourhood_of(lattice: &Lattice, elastic: &Elastic) -> Neighbourhood {
-    cells_away(lattice, if elastic.averaged_dilatation().is_some() { 2 } else { 1 })
+    cells_away(lattice, if elastic.averaged().is_some() { 2 } else { 1 })
 }
 
 /// Those that are one cell away, or two.

@@ -18,10 +18,10 @@
 //!
 //! The cells around a particle are averaged as far as they are of one material: across an interface the dilatation jumps, and
 //! to either side the interface is an edge.
-//! See [`Elastic::averaged_dilatation`] for the source and for when this is done.
+//! See [`Elastic::averaged`] for the source and for when this is done.
 
 use super::cells::{Cells, Incidence};
-use super::elastic::Elastic;
+use super::elastic::{Averaged, Elastic};
 use super::stress::Over;
 use crate::geometry::point::area;
 
@@ -34,16 +34,16 @@ pub struct Patches<'a> {
     on_edge: Vec<bool>,
     /// Area by kind of cell \[length^2\].
     areas: Vec<f64>,
-    /// Stiffness against averaged dilatations, by region \[force / length\].
-    lambda: Vec<Option<f64>>,
+    /// What is averaged, by region.
+    averaged: Vec<Option<Averaged>>,
 }
 
 impl<'a> Patches<'a> {
     /// `None` where no material of the body averages dilatations; `elastic` is that outside inclusions.
     pub fn new(cells: &'a Cells, incidence: &'a Incidence, count: usize, elastic: &Elastic) -> Option<Self> {
         let materials = std::iter::once(elastic).chain(&cells.inclusions);
-        let lambda: Vec<Option<f64>> = materials.map(Elastic::averaged_dilatation).collect();
-        lambda.iter().any(Option::is_some).then_some(())?;
+        let averaged: Vec<Option<Averaged>> = materials.map(Elastic::averaged).collect();
+        averaged.iter().any(Option::is_some).then_some(())?;
         let mut on_edge = vec![false; count];
         cells.boundary_sides(incidence).into_iter().flatten().for_each(|i| on_edge[i as usize] = true);
         if !cells.inclusions.is_empty() {
@@ -54,12 +54,12 @@ impl<'a> Patches<'a> {
             }
         }
         let areas = cells.shapes.iter().map(area).collect();
-        Some(Self { cells, incidence, on_edge, areas, lambda })
+        Some(Self { cells, incidence, on_edge, areas, averaged })
     }
 
-    /// Stiffness against the averaged dilatation of a cell \[force / length\]; `None` where it resists its own.
-    pub fn lambda(&self, cell: usize) -> Option<f64> {
-        self.lambda[self.region(cell)]
+    /// The strain of a cell that is averaged; `None` where it resists all of its own.
+    pub fn averaged(&self, cell: usize) -> Option<Averaged> {
+        self.averaged[self.region(cell)]
     }
 
     fn region(&self, cell: usize) -> usize {
@@ -68,7 +68,7 @@ impl<'a> Patches<'a> {
 
     /// The particles in the middles of the patches that a cell belongs to.
     pub fn middles(&self, cell: usize) -> impl Iterator<Item = usize> + '_ {
-        let corners = self.lambda(cell).map_or(&[][..], |_| self.cells.of(cell));
+        let corners = self.averaged(cell).map_or(&[][..], |_| self.cells.of(cell));
         let any = corners.iter().any(|&i| !self.on_edge[i as usize]);
         corners.iter().map(|&i| i as usize).filter(move |&i| !(any && self.on_edge[i]))
     }
@@ -95,12 +95,13 @@ impl<'a> Patches<'a> {
     /// Mean dilatation of the patch around each particle in each region \[1\], and its area \[length^2\], shape
     /// \[count\]\[regions\]; zero where there is none.
     fn means(&self, strains: &[[f64; 3]]) -> (Vec<f64>, Vec<f64>) {
-        let mut mean = vec![0.0; self.on_edge.len() * self.lambda.len()];
+        let mut mean = vec![0.0; self.on_edge.len() * self.averaged.len()];
         let mut measure = mean.clone();
         for (cell, strain) in strains.iter().enumerate() {
+            let Some(averaged) = self.averaged(cell) else { continue };
             let share = self.share(cell);
             for patch in self.middles(cell).map(|middle| self.patch(middle, cell)) {
-                mean[patch] += share * (strain[0] + strain[1]);
+                mean[patch] += share * averaged.of(*strain);
                 measure[patch] += share;
             }
         }
@@ -110,7 +111,7 @@ impl<'a> Patches<'a> {
 
     /// Number of the patch around a particle that a cell belongs to.
     fn patch(&self, middle: usize, cell: usize) -> usize {
-        middle * self.lambda.len() + self.region(cell)
+        middle * self.averaged.len() + self.region(cell)
     }
 }
 
@@ -121,13 +122,14 @@ pub fn averaged(cells: &Cells, elastic: &Elastic, mut strains: Vec<[f64; 3]>, co
     let incidence = cells.incidence(count);
     if let Some(patches) = Patches::new(cells, &incidence, count, elastic) {
         let (mean, _) = patches.means(&strains);
-        for (cell, strain) in
-            strains.iter_mut().enumerate().filter(|&(cell, _)| patches.lambda(cell).is_some())
-        {
+        for (cell, strain) in strains.iter_mut().enumerate() {
+            let Some(averaged) = patches.averaged(cell) else { continue };
             let middles = patches.middles(cell).count() as f64;
-            let averaged = patches.middles(cell).map(|i| mean[patches.patch(i, cell)]).sum::<f64>() / middles;
-            let add = 0.5 * (averaged - strain[0] - strain[1]);
-            *strain = [strain[0] + add, strain[1] + add, strain[2]];
+            let there = patches.middles(cell).map(|i| mean[patches.patch(i, cell)]).sum::<f64>() / middles;
+            // Of what is resisted most alone, which brings no other strain with it: its tensor is half its weights', in engineering shear the whole.
+            let add = 0.5 * (there - averaged.of(*strain));
+            let [xx, yy, xy] = averaged.weights;
+            *strain = [strain[0] + add * xx, strain[1] + add * yy, strain[2] + 2.0 * add * xy];
         }
     }
     strains
@@ -144,11 +146,11 @@ pub fn energy(
     let incidence = cells.incidence(count);
     let Some(patches) = Patches::new(cells, &incidence, count, elastic) else { return 0.0 };
     let (mean, measure) = patches.means(strains);
-    let regions = patches.lambda.len();
-    let of_region = |(region, lambda): (usize, &Option<f64>)| {
+    let regions = patches.averaged.len();
+    let of_region = |(region, averaged): (usize, &Option<Averaged>)| {
         let patches = over.particles.clone().map(|i| (i, i * regions + region));
         let mut all = patches.map(|(i, patch)| (i, measure[patch] * mean[patch] * mean[patch]));
-        lambda.unwrap_or(0.0) * (over.sum)(&mut all)
+        averaged.map_or(0.0, |averaged| averaged.stiffness) * (over.sum)(&mut all)
     };
-    0.5 * patches.lambda.iter().enumerate().map(of_region).sum::<f64>()
+    0.5 * patches.averaged.iter().enumerate().map(of_region).sum::<f64>()
 }

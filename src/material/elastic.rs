@@ -4,6 +4,8 @@
 //! textbook relations, e.g. O. C. Zienkiewicz and R. L. Taylor, *The Finite Element Method*, vol. 1;
 //! for the orthotropic sheet R. M. Jones, *Mechanics of Composite Materials*, ch. 2.
 
+use std::f64::consts::SQRT_2;
+
 use nalgebra::{Matrix3, Vector3};
 
 /// Strain to membrane force, Voigt order (xx, yy, xy) \[force / length\], shape \[3, 3\].
@@ -49,13 +51,27 @@ pub enum Constants {
     },
 }
 
-/// Poisson's ratio in plane strain above which dilatations are averaged: see [`Elastic::averaged_dilatation`]. In plane stress
+/// Poisson's ratio in plane strain above which dilatations are averaged: see [`Elastic::averaged`]. In plane stress
 /// 2/3 is as much: Lame's lambda over the shear modulus is the same.
 const LOCKS_ABOVE: f64 = 0.4;
 
-/// Stiffness of cells against one strain over that against another beyond which they are cautioned against: see
+/// Stiffness against the strain that is resisted most over that against the next, beyond which it is averaged, over the square of the
+/// determinant of its weights (1 for a dilatation, -1 for a shear, 0 for a stretch along fibres): that of an isotropic material at
+/// `LOCKS_ABOVE`.
+const AVERAGED_BEYOND: f64 = 5.0;
+
+/// Energy of a bent square of bilinear displacement over that in the continuum, beyond which it locks: with 10 cells across a beam is 3 % too stiff.
+const BENDS_BEYOND: f64 = 4.0;
+
+/// Stiffness of rectangles against one strain over that against another beyond which they are cautioned against: see
 /// [`Elastic::locks`]. At nu = -0.8 in plane stress it is as much.
 const LOCKS_BEYOND: f64 = 9.0 * (1.0 + 1e-9);
+
+/// The same of other cells, whose stress is not assumed: with 10 triangles across a cantilever is 3 % too stiff with fibres at 30 degrees that are 6 times as stiff.
+const LOCKS_BEYOND_ELSEWHERE: f64 = 5.0 * (1.0 + 1e-9);
+
+/// Poisson's ratio in plane strain above which iterations are many.
+const NEAR_A_HALF: f64 = 0.49;
 
 /// Why constants make no stable material.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -113,12 +129,53 @@ pub(super) fn mandel(stiffness: &Voigt) -> Matrix3<f64> {
     Matrix3::from_fn(|i, j| stiffness[(i, j)] * weight(i) * weight(j))
 }
 
+/// A strain that is resisted by its mean over the cells around a particle: see [`Elastic::averaged`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Averaged {
+    /// The weights of the strain's components (xx, yy, engineering xy) \[1\]: 1, 1, 0 of a dilatation. As a tensor their square is 2.
+    pub weights: [f64; 3],
+    /// What resists it \[force / length\]: of a dilatation Lame's lambda times the thickness.
+    pub stiffness: f64,
+}
+
+impl Averaged {
+    /// The strain of these components \[1\].
+    pub fn of(&self, strain: [f64; 3]) -> f64 {
+        let [xx, yy, xy] = self.weights;
+        xx * strain[0] + yy * strain[1] + xy * strain[2]
+    }
+
+    /// The strain that is resisted far more than all others, if it is no stretch along fibres.
+    fn of_stiffness(stiffness: &Voigt) -> Option<Self> {
+        let ([_, next, most], weights) = stiffest_strain(stiffness);
+        // The harder it is to invert, the more it takes: at nu_12 = 1.2, with E_1 = 10 E_2, squares are nearer to the truth without.
+        let is_alone = most * determinant(weights).powi(2) > AVERAGED_BEYOND * next;
+        is_alone.then_some(Self { weights, stiffness: 0.5 * (most - next) })
+    }
+}
+
+/// Stiffnesses against strains of size 1, ascending \[force / length\], and the weights of the strain that is resisted most, as those of [`Averaged`].
+fn stiffest_strain(stiffness: &Voigt) -> ([f64; 3], [f64; 3]) {
+    let eigen = mandel(stiffness).symmetric_eigen();
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+    let [xx, yy, xy]: [f64; 3] = eigen.eigenvectors.column(order[2]).into_owned().into();
+    let weights = [SQRT_2 * xx, SQRT_2 * yy, xy].map(|weight| if xx + yy < 0.0 { -weight } else { weight });
+    (order.map(|k| eigen.eigenvalues[k]), weights)
+}
+
+/// Of the tensor of these weights: 1 of a dilatation, -1 of a shear.
+fn determinant([xx, yy, xy]: [f64; 3]) -> f64 {
+    xx * yy - xy * xy
+}
+
 /// A sheet: admissible constants and a thickness \[length\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Elastic {
     constants: Constants,
     thickness: f64,
     stiffness: Voigt,
+    averaged: Option<Averaged>,
 }
 
 impl Elastic {
@@ -136,7 +193,12 @@ impl Elastic {
         if !fits {
             return Err(ElasticError::Range);
         }
-        Ok(Self { constants, thickness, stiffness })
+        let averaged = match constants {
+            Constants::Isotropic { poisson, plane, .. } => (in_plane_strain(poisson, plane) > LOCKS_ABOVE)
+                .then(|| Averaged { weights: [1.0, 1.0, 0.0], stiffness: stiffness[(0, 1)] }),
+            Constants::Orthotropic { .. } => Averaged::of_stiffness(&stiffness),
+        };
+        Ok(Self { constants, thickness, stiffness, averaged })
     }
 
     /// The constants that the stiffness was made from.
@@ -178,8 +240,8 @@ impl Elastic {
         0.5 * (along * across).sqrt() * (1.0 / shear - 2.0 * poisson_12 / along)
     }
 
-    /// Stiffness against a dilatation averaged over the cells around a particle, instead of that of each cell: Lame's
-    /// lambda times the thickness \[force / length\]. `None` where each cell resists its own.
+    /// The strain that is resisted by its mean over the cells around a particle, instead of that of each cell: a dilatation in
+    /// isotropic materials. `None` where each cell resists its own.
     ///
     /// Towards nu = 1/2 in plane strain lambda grows without bound, and cells that each keep their area have too few
     /// ways left to deform: they lock. One condition for each particle leaves enough, on triangles, quadrilaterals and
@@ -187,24 +249,41 @@ impl Elastic {
     /// and nearly incompressible dynamic explicit applications*, Comm. Numer. Meth. Eng. 14, 1998; the patches of E. A. de
     /// Souza Neto, F. M. Andrade Pires and D. R. J. Owen, IJNME 62, 2005, are groups of cells instead). It takes neighbours
     /// two cells away, so it is used above nu = 0.4 alone in plane strain, and above 2/3 in plane stress.
-    pub fn averaged_dilatation(&self) -> Option<f64> {
-        (self.poisson_in_plane_strain()? > LOCKS_ABOVE).then(|| self.stiffness[(0, 1)])
+    ///
+    /// The stiffness of an orthotropic material is split by its eigenvectors (S. C. Cowin and M. M. Mehrabadi, *The structure of the
+    /// linear anisotropic elastic symmetries*, J. Mech. Phys. Solids 40, 1992): it is `mu_1 n n'` of the strain `n` that is resisted most, of which all
+    /// beyond that of the next strain, `mu_1 - mu_2`, is averaged; 2 lambda of an isotropic one. The rest is positive definite.
+    /// To keep `N : grad u = div (N u)` at zero is as hard for cells as it is to keep `div u`, since `N u` is continuous as `u` is,
+    /// as long as `N` can be inverted: a dilatation in stretched axes, or a shear. A stretch along fibres has an `N` of rank one, and each cell resists its own.
+    pub fn averaged(&self) -> Option<Averaged> {
+        self.averaged
     }
 
-    /// Poisson's ratio of the isotropic material that behaves so in plane strain \[1\]; `None` of an orthotropic one.
-    pub fn poisson_in_plane_strain(&self) -> Option<f64> {
+    /// Whether it resists one strain more than 50 times as much as all others, but by its mean: iterations are many. At nu = 0.49 in plane
+    /// strain it is as much.
+    pub fn is_nearly_incompressible(&self) -> bool {
         match self.constants {
-            Constants::Isotropic { poisson, plane: Plane::Strain, .. } => Some(poisson),
-            Constants::Isotropic { poisson, plane: Plane::Stress, .. } => Some(poisson / (1.0 + poisson)),
-            Constants::Orthotropic { .. } => None,
+            Constants::Isotropic { poisson, plane, .. } => in_plane_strain(poisson, plane) > NEAR_A_HALF,
+            Constants::Orthotropic { .. } => {
+                let next = mandel(&self.stiffness_of_cells()).symmetric_eigenvalues().max();
+                self.averaged.is_some_and(|averaged| 2.0 * averaged.stiffness > 49.0 * next)
+            }
         }
     }
 
-    /// Whether its cells resist one strain so much more than another that they lock: near nu = -1 in plane stress, and with
-    /// fibres that do not lie along their sides.
-    pub fn locks(&self) -> bool {
-        let cells = mandel(&self.stiffness_of_cells()).symmetric_eigenvalues();
-        cells.max() > LOCKS_BEYOND * cells.min()
+    /// How many times as much its cells resist one strain as another \[1\], and which, if that is so much that they lock; `are_rectangles`
+    /// says that they have sides along `angle` from x \[rad\]. That happens near nu = -1 in plane stress, and with fibres, beside
+    /// rectangles along them.
+    pub fn locks(&self, (are_rectangles, angle): (bool, f64)) -> Option<(f64, &'static str)> {
+        let ([least, _, most], weights) = stiffest_strain(&self.stiffness_of_cells());
+        let beyond = if are_rectangles { LOCKS_BEYOND } else { LOCKS_BEYOND_ELSEWHERE };
+        let locks = most > beyond * least && (!are_rectangles || self.locks_bilinear(angle));
+        let strain = match determinant(weights) {
+            size if size > 0.5 => "a change of area",
+            size if size < -0.5 => "a shear",
+            _ => "a stretch along fibres",
+        };
+        locks.then(|| (most / least, strain))
     }
 
     /// The angle of its fibres from x, counter-clockwise \[rad\].
@@ -215,16 +294,29 @@ impl Elastic {
         }
     }
 
-    /// The stiffness less what resists dilatation by [`Elastic::averaged_dilatation`] \[force / length\]: all of it where
-    /// that is none.
+    /// The stiffness less what resists a strain by its mean, [`Elastic::averaged`] \[force / length\]: all of it where
+    /// there is none.
     pub fn stiffness_of_cells(&self) -> Voigt {
-        match self.averaged_dilatation() {
-            None => self.stiffness,
-            Some(_) => {
+        match (self.averaged, self.constants) {
+            (None, _) => self.stiffness,
+            (Some(_), Constants::Isotropic { .. }) => {
                 let shear = self.stiffness[(2, 2)];
                 Matrix3::from_diagonal(&Vector3::new(2.0 * shear, 2.0 * shear, shear))
             }
+            (Some(Averaged { weights, stiffness }), Constants::Orthotropic { .. }) => {
+                let weights = Vector3::from(weights);
+                self.stiffness - weights * weights.transpose() * stiffness
+            }
         }
+    }
+
+    /// Whether squares of bilinear displacement with sides along this angle from x \[rad\] are too stiff in bending: `u = x y` about the
+    /// side along x has the strain `y` along it and the shear `x`, where there should be tension alone.
+    pub fn locks_bilinear(&self, angle: f64) -> bool {
+        let own = turned(&self.stiffness, -angle);
+        // An admissible stiffness is positive definite.
+        let Some(compliance) = own.try_inverse() else { return false };
+        [0, 1].into_iter().any(|k| (own[(k, k)] + own[(2, 2)]) * compliance[(k, k)] > BENDS_BEYOND)
     }
 
     /// In-plane stress (xx, yy, xy) \[force / length^2\] under a strain (xx, yy, engineering xy) \[1\].
@@ -265,6 +357,11 @@ pub fn von_mises([xx, yy, xy]: [f64; 3], zz: f64) -> f64 {
         return of(a, b, c, xy);
     }
     largest * of(a / largest, b / largest, c / largest, xy / largest)
+}
+
+/// Poisson's ratio of the isotropic material that behaves so in plane strain \[1\].
+fn in_plane_strain(poisson: f64, plane: Plane) -> f64 {
+    if plane == Plane::Strain { poisson } else { poisson / (1.0 + poisson) }
 }
 
 fn positive(name: &'static str, value: f64) -> Result<(), ElasticError> {

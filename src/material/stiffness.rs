@@ -7,7 +7,8 @@
 //! * Triangle: constant strain (M. J. Turner et al., 1956).
 //! * Quadrilateral: bilinear, 2x2 Gauss points (O. C. Zienkiewicz and R. L. Taylor, *The Finite
 //!   Element Method*, vol. 1). Plane strain near nu = 1/2 would lock it, as it would the triangle:
-//!   see [`super::dilatation`]. A parallelogram without right angles: assumed stress
+//!   see [`super::dilatation`]. A parallelogram without right angles, and a rectangle of a material that is far too stiff in
+//!   bending if its displacement is bilinear ([`Elastic::locks_bilinear`]): assumed stress
 //!   (T. H. H. Pian and K. Sumihara, *Rational approach for assumed stress finite elements*, IJNME 20, 1984).
 //! * Any other polygon: the virtual element of lowest order (L. Beirao da Veiga, F. Brezzi and
 //!   L. D. Marini, *Virtual elements for linear elasticity problems*, SIAM J. Numer. Anal. 51, 2013; in the
@@ -46,14 +47,14 @@ pub enum ShapeError {
 /// triangle, a quadrilateral or a virtual element by the number of corners. `corners` \[length\] run
 /// counter-clockwise.
 pub fn element(corners: &[[f64; 2]], stiffness: &Voigt) -> Result<DMatrix<f64>, ShapeError> {
-    whole_cell(corners, [stiffness; 2], false)
+    whole_cell(corners, [stiffness; 2], (is_oblique(corners), false))
 }
 
-/// Stiffness of a cell of a material whose dilatations are averaged over several cells: what each cell has to itself
+/// Stiffness of a cell of a material of which a strain is averaged over several cells: what each cell has to itself
 /// ([`Elastic::stiffness_of_cells`]). `cut` asks for [`cut_cell`] instead of [`element`].
 ///
 /// The stabilisation, beside the mean strain, is that of the whole material, which stays bounded as nu goes to 1/2;
-/// rectangles are then stabilised as cut cells are.
+/// rectangles are then stabilised as cut cells are, with fibres as parallelograms, which is the same where there are none.
 ///
 /// # Errors
 /// As [`element`].
@@ -62,25 +63,36 @@ pub fn element_of(corners: &[[f64; 2]], elastic: &Elastic, cut: bool) -> Result<
     if cut {
         return resistance(corners, &own, |corners| cut_stabilisation(corners, whole));
     }
-    whole_cell(corners, [&own, whole], elastic.averaged_dilatation().is_some())
+    let ways = (assumes_stress(corners, elastic), elastic.averaged().is_some());
+    whole_cell(corners, [&own, whole], ways)
 }
 
 /// Whether the cell has the energy of a displacement that is continuous from cell to cell, as Galerkin's method has it, and no
-/// other: triangles and whole rectangles, where dilatations are not averaged.
+/// other: triangles and whole rectangles, where no strain is averaged and no stress assumed.
 pub fn is_conforming(corners: &[[f64; 2]], elastic: &Elastic, cut: bool) -> bool {
-    let is_rectangle = corners.len() == 4 && !cut && !is_oblique(corners);
-    elastic.averaged_dilatation().is_none() && (corners.len() == 3 || is_rectangle)
+    let is_bilinear = corners.len() == 4 && !cut && !assumes_stress(corners, elastic);
+    elastic.averaged().is_none() && (corners.len() == 3 || is_bilinear)
+}
+
+/// Whether a whole cell is one of assumed stress.
+fn assumes_stress(corners: &[[f64; 2]], elastic: &Elastic) -> bool {
+    let Some([along, _]) = sides_of_parallelogram(corners) else { return false };
+    let is_rectangle_too = match elastic.averaged() {
+        Some(_) => elastic.fibres().is_some(),
+        None => elastic.locks_bilinear(along.y.atan2(along.x)),
+    };
+    is_oblique(corners) || is_rectangle_too
 }
 
 /// The cell by what it has to itself, and by the whole material where that is not all of it.
 fn whole_cell(
     corners: &[[f64; 2]],
     [own, whole]: [&Voigt; 2],
-    is_averaged: bool,
+    (assumes_stress, is_averaged): (bool, bool),
 ) -> Result<DMatrix<f64>, ShapeError> {
     match corners.len() {
         3 => triangle(corners, own),
-        4 if is_oblique(corners) => resistance(corners, own, |corners| oblique_stabilisation(corners, whole)),
+        4 if assumes_stress => resistance(corners, own, |corners| bending_of_sides(corners, whole)),
         4 if is_averaged => resistance(corners, own, |corners| cut_stabilisation(corners, whole)),
         4 => quadrilateral(corners, own),
         _ => resistance(corners, own, |corners| stabilisation(corners, whole)),
@@ -168,19 +180,25 @@ fn cut_stabilisation(corners: &[[f64; 2]], stiffness: &Voigt) -> DMatrix<f64> {
     (rest.transpose() * rest).kronecker(&bending_tensor(corners, bending_modulus(&AXES, stiffness)))
 }
 
-/// Whether a quadrilateral is a parallelogram without right angles.
-fn is_oblique(corners: &[[f64; 2]]) -> bool {
-    let [a, b, c, d] = [0, 1, 2, 3].map(|k| Vector2::from(corners[k]));
+/// The sides of a parallelogram from its first corner \[length\]; `None` of any other polygon.
+fn sides_of_parallelogram(corners: &[[f64; 2]]) -> Option<[Vector2<f64>; 2]> {
+    let &[a, b, c, d] = corners else { return None };
+    let [a, b, c, d] = [a, b, c, d].map(Vector2::from);
     let (along, up) = (b - a, d - a);
-    let size = along.norm() * up.norm();
-    (a - b + c - d).norm() <= 1e-9 * size.sqrt() && along.dot(&up).abs() > 1e-9 * size
+    ((a - b + c - d).norm() <= 1e-9 * (along.norm() * up.norm()).sqrt()).then_some([along, up])
+}
+
+/// Whether a polygon is a parallelogram without right angles.
+fn is_oblique(corners: &[[f64; 2]]) -> bool {
+    sides_of_parallelogram(corners)
+        .is_some_and(|[along, up]| along.dot(&up).abs() > 1e-9 * (along.norm() * up.norm()))
 }
 
 /// The rest of a parallelogram of assumed stress: stress along either pair of sides that grows from one of them to the other
 /// is uniaxial, so `T = A / 3 sum E_t t t' / l^2` over the two directions `t`, `l` the length of sides along `t`, `E_t` the modulus of tension
 /// along `t`. Bilinear cells resist bending by its direction: with them the error on a ring of cells of 70 degrees falls by
 /// order 1.88 from spacing 1/2 to 1/4, with these by 2.03.
-fn oblique_stabilisation(corners: &[[f64; 2]], stiffness: &Voigt) -> DMatrix<f64> {
+fn bending_of_sides(corners: &[[f64; 2]], stiffness: &Voigt) -> DMatrix<f64> {
     let rest = DMatrix::identity(4, 4) - affine_projection(corners);
     let [a, b, d] = [0, 1, 3].map(|k| Vector2::from(corners[k]));
     let tensor: Matrix2<f64> = [b - a, d - a]

@@ -195,7 +195,7 @@ impl Scene {
 /// Of what a body and its inclusions are made of: what needs neighbours that are farthest away.
 fn farthest_seeing<'a>(body: Option<&'a Elastic>, inclusions: &'a [Inclusion]) -> Option<&'a Elastic> {
     let mut all = body.into_iter().chain(inclusions.iter().map(|part| &part.material));
-    all.find(|elastic| elastic.averaged_dilatation().is_some()).or(body)
+    all.find(|elastic| elastic.averaged().is_some()).or(body)
 }
 
 /// Where the particles of the body come from.

@@ -165,12 +165,13 @@ fn components_that_have_been_led_stay_where_they_are_a_corner_along_both_axes_an
         let mut kept = None;
         let outcome = run(stretched(both, &[]).1, &mut |engine, residual| {
             if engine.step() == 1000 {
-                kept = Some((EngineState::of(engine).into_owned(), residual));
+                kept = Some((engine.clone(), residual));
             }
             ControlFlow::Continue(())
         });
         assert!(off_uniform(both, &outcome) < 1e-9, "{both}: {:?}", measured(&outcome).reactions);
         let mut see = |_: &Engine, _: f64| ControlFlow::Continue(());
+        let kept = kept.as_ref().map(|(engine, residual)| (EngineState::of(engine), *residual));
         let resumed = run_shared(stretched(both, &[]).1, kept, None::<&Team>, &mut EachStep(&mut see));
         let resumed = resumed.expect("the same body");
         let all = outcome.engine.present().iter().zip(resumed.engine.present().iter());

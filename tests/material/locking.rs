@@ -29,6 +29,19 @@ fn slice(poisson: f64) -> Elastic {
     Elastic::new(constants, 1.0).expect("admissible")
 }
 
+/// Nearly area-preserving, in axes that are stretched and turned.
+fn fibres(poisson_12: f64) -> Elastic {
+    let constants = Constants::Orthotropic { young: [1000.0, 250.0], poisson_12, shear: 150.0, angle: 0.4 };
+    Elastic::new(constants, 1.0).expect("admissible")
+}
+
+/// Resists shear far more than all else.
+fn stiff_in_shear() -> Elastic {
+    let constants =
+        Constants::Orthotropic { young: [1000.0, 1000.0], poisson_12: 0.0, shear: 5e4, angle: 0.0 };
+    Elastic::new(constants, 1.0).expect("admissible")
+}
+
 /// A displacement in equilibrium, and the stress (xx, yy, xy) that it has.
 type Exact<'a> = &'a dyn Fn([f64; 2]) -> ([f64; 2], [f64; 3]);
 
@@ -96,10 +109,63 @@ fn no_lattice_locks_near_incompressibility() {
     }
 }
 
+/// A strip bent by its ends, of length 8 and depth 2: the stress xx alone, as large as y, in a material of any symmetry
+/// (S. G. Lekhnitskii, *Anisotropic Plates*, 1968).
+fn bent_sheet(elastic: &Elastic, [x, y]: [f64; 2]) -> ([f64; 2], [f64; 3]) {
+    let [along, across, slanted] = elastic.strain([1.0, 0.0, 0.0]);
+    let u = along * x * y + 0.5 * slanted * y * y;
+    ([u, 0.5 * (across * y * y - along * x * x)], [y, 0.0, 0.0])
+}
+
 #[test]
-fn averaged_dilatations_pass_the_patch_test_and_pull_back_alike() {
-    let elastic = slice(0.4999);
+fn no_lattice_locks_where_an_orthotropic_material_resists_one_strain_far_more_than_all_others() {
     for spacings in SPACINGS {
+        let of = |elastic: Elastic, h: f64| {
+            error(spacings(h), [[0.0, -1.0], [8.0, 1.0]], &elastic, &|p| bent_sheet(&elastic, p))
+        };
+        let mild = of(fibres(0.6), 0.25);
+        let errors = [fibres(1.9), fibres(1.99), fibres(1.9999), stiff_in_shear()].map(|e| of(e, 0.25));
+        let finer = of(fibres(1.9999), 0.125);
+        println!("{:?}: {:.2?} e-3", spacings(0.25), [mild, errors[2], finer].map(|error| 1e3 * error));
+        assert!(errors.iter().all(|&error| error < 0.03), "{:?}: {mild} {errors:?}", spacings(0.25));
+        assert!(finer < 0.5 * errors[2], "{:?}: {errors:?} {finer}", spacings(0.25));
+    }
+}
+
+#[test]
+fn an_isotropic_material_written_as_orthotropic_is_the_same() {
+    for spacings in SPACINGS {
+        for poisson in [-0.9, 0.3, 0.7, 0.98, 0.9998] {
+            let shear = 500.0 / (1.0 + poisson);
+            let sheets = [
+                Constants::Isotropic { young: 1000.0, poisson, plane: Plane::Stress },
+                Constants::Orthotropic { young: [1000.0; 2], poisson_12: poisson, shear, angle: 0.7 },
+            ];
+            let [a, b] = sheets.map(|constants| {
+                let elastic = Elastic::new(constants, 1.0).expect("admissible");
+                let outline = Outline::of_shape(&Shape::Rectangle { min: [0.0; 2], max: [3.0, 2.0] });
+                let fitted = fit(&Lattice::new(spacings(0.4), [0.0; 2], 0.0), &outline.expect("fits"));
+                let (body, cells) = fitted.map(|fitted| (fitted.body, fitted.cells)).expect("fits");
+                let near = cells.neighbours(body.count(), &elastic);
+                MaterialWeights::assemble(&cells, &body, near, &elastic).expect("assembles")
+            });
+            assert_eq!(a.neighbours, b.neighbours, "{:?} {poisson}", spacings(0.4));
+            for i in 0..a.neighbours.count() {
+                let scale = a.of(i).diagonal[0][0];
+                let blocks = a.of(i).blocks.iter().zip(&b.of(i).blocks);
+                let apart = blocks.flat_map(|(a, b)| (0..4).map(|k| a[k / 2][k % 2] - b[k / 2][k % 2]));
+                let apart = apart.fold(0.0, |most: f64, one| most.max(one.abs()));
+                assert!(apart < 1e-10 * scale, "{:?} {poisson}: {apart} of {scale}", spacings(0.4));
+            }
+        }
+    }
+}
+
+#[test]
+fn averaged_strains_pass_the_patch_test_and_pull_back_alike() {
+    let materials = [slice(0.4999), fibres(1.999), stiff_in_shear()];
+    for (spacings, elastic) in SPACINGS.into_iter().flat_map(|kind| materials.map(|elastic| (kind, elastic)))
+    {
         let shape = Shape::Disc { centre: [0.3, 0.1], radius: 2.0 };
         let outline = Outline::of_shape(&shape).expect("a disc");
         let fitted = fit(&Lattice::new(spacings(0.4), [0.0; 2], 0.3), &outline).expect("fits");

@@ -4,6 +4,8 @@ use super::parts::{PLATE, assert_scene_parted_the_same, plate};
 use super::written::{SEVERAL, assert_frames_the_same, assert_tables_the_same};
 
 const SOFT: &str = "material={kind=\"isotropic\",young=1000.0,poisson=0.49,plane=\"strain\"}";
+const WOVEN: &str =
+    "material={kind=\"orthotropic\",young=[1000.0,250.0],poisson_12=1.9,shear=150.0,angle=20.0}";
 const FITTED: &str = "body.outline=\"fitted\"";
 
 #[test]
@@ -32,6 +34,8 @@ fn averaged_dilatations_beside_cut_cells_in_parts_have_the_bits_of_those_of_a_wh
         &[SOFT, long, SEVERAL],
         &[SOFT, long, &hexagonal],
         &[SOFT, aligned, places],
+        &[WOVEN, SEVERAL, places],
+        &[WOVEN, &hexagonal, rotates],
     ] {
         let sets = [&[FITTED], sets].concat();
         assert_scene_parted_the_same(&plate(PLATE, &sets), &format!("{sets:?}"), 25);

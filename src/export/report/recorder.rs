@@ -478,7 +478,7 @@ fn stress(scene: &Scene) -> Option<Stress> {
     let stays = |then: &Scene| of(then) == of(scene) && then.inclusions == scene.inclusions;
     let mut actions = scene.actions.iter();
     let is_one = actions.all(|action| !matches!(&action.what, ActionKind::Follow(then) if !stays(then)));
-    if !is_one || !scene.inclusions.is_empty() || elastic.averaged_dilatation().is_some() {
+    if !is_one || !scene.inclusions.is_empty() || elastic.averaged().is_some() {
         return None;
     }
     let unit = |k: usize| elastic.stress([0, 1, 2].map(|axis| f64::from(u8::from(axis == k))));

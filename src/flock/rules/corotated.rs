@@ -105,7 +105,7 @@ impl Turn {
     }
 
     /// `R' (X + u) - X`.
-    fn strained(self, Corner { reference: [x, y], displacement: [u, v] }: Corner) -> [f64; 2] {
+    pub(super) fn strained(self, Corner { reference: [x, y], displacement: [u, v] }: Corner) -> [f64; 2] {
         [
             self.versed * x + self.sin * y + self.cos * u + self.sin * v,
             self.versed * y - self.sin * x + self.cos * v - self.sin * u,
@@ -277,7 +277,7 @@ fn place(turn: Turn, corner: Corner) -> [f64; 2] {
     [strained[0] + corner.reference[0], strained[1] + corner.reference[1]]
 }
 
-fn quarter([x, y]: [f64; 2]) -> [f64; 2] {
+pub(super) fn quarter([x, y]: [f64; 2]) -> [f64; 2] {
     [-y, x]
 }
 

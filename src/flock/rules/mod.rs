@@ -20,7 +20,7 @@ use std::fmt;
 
 use super::block::{Block, IDENTITY, apply};
 
-pub use averaged::{PatchCell, PatchRow, row as patch_row};
+pub use averaged::{PatchCell, PatchRow, row as patch_row, weighted};
 pub use corotated::{CellAround, CellRow, Corner, Element, OWN, Turn, pull};
 pub use feedback::{Feedback, FeedbackReference};
 pub use material::Rotation;

@@ -9,7 +9,7 @@ use super::WeightsError;
 use crate::flock::block::{Block, inverse, plus};
 use crate::flock::cells_around::CellsAround;
 use crate::flock::neighbourhood::Neighbours;
-use crate::flock::rules::{Element, OWN};
+use crate::flock::rules::{Element, OWN, weighted};
 use crate::material::cells::{Cells, Incidence};
 use crate::material::dilatation::Patches;
 use crate::material::elastic::Elastic;
@@ -40,6 +40,8 @@ pub(super) struct Assembly<'a> {
 struct Patch {
     /// Lambda over the area \[force / length^3\].
     stiffness: f64,
+    /// Of the strain that is averaged: see [`Averaged`](crate::material::elastic::Averaged).
+    weights: [f64; 3],
     parts: Vec<Part>,
 }
 
@@ -180,20 +182,20 @@ impl<'a> Assembly<'a> {
         let own = |cell: &usize| self.cells.of(*cell).contains(&(particle as u32));
         let felt = around.filter(|patch| patch.iter().any(own));
         let of_cells = |cells: Vec<usize>| {
-            let lambda = patches.lambda(cells[0]).unwrap_or(0.0);
+            let averaged = patches.averaged(cells[0])?;
             let part = |cell: usize| Part { cell, share: patches.share(cell) };
             let parts: Vec<Part> = cells.into_iter().map(part).collect();
             let area: f64 = parts.iter().map(|part| part.share).sum();
-            Patch { stiffness: lambda / area, parts }
+            Some(Patch { stiffness: averaged.stiffness / area, weights: averaged.weights, parts })
         };
-        felt.map(of_cells).collect()
+        felt.filter_map(of_cells).collect()
     }
 
     /// Adds the averaged dilatations to the row of a particle: `k v_i v_j'` for each patch, `v` the sum over its cells
-    /// of share times mean gradient. The sums run in the same order for either of two particles: no bit of `K_ij` differs
+    /// of share times mean gradient, with the weights of the strain. The sums run in the same order for either of two particles: no bit of `K_ij` differs
     /// from that of the transpose of `K_ji`.
     fn add_patches(&self, particle: usize, blocks: &mut [Block]) -> Result<(), WeightsError> {
-        for Patch { stiffness, parts } in self.patches(particle) {
+        for Patch { stiffness, weights, parts } in self.patches(particle) {
             let mut v: Vec<(u32, [f64; 2])> = Vec::new();
             for Part { cell, share } in parts {
                 let kind = self.cells.kind[cell] as usize;
@@ -203,7 +205,7 @@ impl<'a> Assembly<'a> {
                         missing: self.cells.of(cell)[corner] as usize + 1,
                         neighbours: self.most_neighbours(),
                     })?;
-                    let [x, y] = self.gradients[kind][corner].map(|g| share * g);
+                    let [x, y] = weighted(weights, self.gradients[kind][corner]).map(|g| share * g);
                     match v.iter_mut().find(|(known, _)| *known == slot) {
                         Some((_, sum)) => *sum = [sum[0] + x, sum[1] + y],
                         None => v.push((slot, [x, y])),
@@ -292,9 +294,9 @@ impl<'a> Assembly<'a> {
                 let own = slots.iter().position(|&slot| slot == OWN).unwrap_or_default();
                 around.push(self.cells.kind[cell], own, &slots);
             }
-            for Patch { stiffness, parts } in self.patches(particle) {
+            for Patch { stiffness, weights, parts } in self.patches(particle) {
                 let of_part = |part: &Part| (self.cells.kind[part.cell], part.share, slots(part.cell));
-                around.push_patch(stiffness, parts.iter().map(of_part));
+                around.push_patch((stiffness, weights), parts.iter().map(of_part));
             }
             around.end_class();
         }
