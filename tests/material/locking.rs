@@ -151,9 +151,10 @@ fn an_isotropic_material_written_as_orthotropic_is_the_same() {
             });
             assert_eq!(a.neighbours, b.neighbours, "{:?} {poisson}", spacings(0.4));
             for i in 0..a.neighbours.count() {
-                let scale = a.of(i).diagonal[0][0];
-                let blocks = a.of(i).blocks.iter().zip(&b.of(i).blocks);
-                let apart = blocks.flat_map(|(a, b)| (0..4).map(|k| a[k / 2][k % 2] - b[k / 2][k % 2]));
+                let scale = a.diagonal(i)[0][0];
+                let blocks = a.bonds(i).zip(b.bonds(i));
+                let apart =
+                    blocks.flat_map(|((_, a), (_, b))| (0..4).map(|k| a[k / 2][k % 2] - b[k / 2][k % 2]));
                 let apart = apart.fold(0.0, |most: f64, one| most.max(one.abs()));
                 assert!(apart < 1e-10 * scale, "{:?} {poisson}: {apart} of {scale}", spacings(0.4));
             }
