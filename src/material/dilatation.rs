@@ -127,8 +127,8 @@ pub fn averaged(cells: &Cells, elastic: &Elastic, mut strains: Vec<[f64; 3]>, co
             let middles = patches.middles(cell).count() as f64;
             let there = patches.middles(cell).map(|i| mean[patches.patch(i, cell)]).sum::<f64>() / middles;
             // Of what is resisted most alone, which brings no other strain with it: its tensor is half its weights', in engineering shear the whole.
-            let add = 0.5 * (there - averaged.of(*strain));
             let [xx, yy, xy] = averaged.weights;
+            let add = 0.5 * (there - xx * strain[0] - yy * strain[1] - xy * strain[2]);
             *strain = [strain[0] + add * xx, strain[1] + add * yy, strain[2] + 2.0 * add * xy];
         }
     }
