@@ -70,6 +70,9 @@ const LOCKS_BEYOND: f64 = 9.0 * (1.0 + 1e-9);
 /// The same of other cells, whose stress is not assumed: with 10 triangles across a cantilever is 3 % too stiff with fibres at 30 degrees that are 6 times as stiff.
 const LOCKS_BEYOND_ELSEWHERE: f64 = 5.0 * (1.0 + 1e-9);
 
+/// What fibres resist.
+pub const STRETCH: &str = "a stretch along fibres";
+
 /// Poisson's ratio in plane strain above which iterations are many.
 const NEAR_A_HALF: f64 = 0.49;
 
@@ -281,7 +284,7 @@ impl Elastic {
         let strain = match determinant(weights) {
             size if size > 0.5 => "a change of area",
             size if size < -0.5 => "a shear",
-            _ => "a stretch along fibres",
+            _ => STRETCH,
         };
         locks.then(|| (most / least, strain))
     }
