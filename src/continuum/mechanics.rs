@@ -23,8 +23,8 @@ const MISSED_WORK: f64 = 0.05;
 const UNBALANCED: f64 = 0.01;
 /// Strain of a body that has been unloaded again, but for rounding \[1\].
 const UNSTRAINED: f64 = 1e-7;
-/// Resultant forces over the sizes of all of them, at which they cancel to rounding \[1\].
-const CANCELLED: f64 = 1e-6;
+/// Roundings of what neighbours pull with that may be all that reactions are \[1\].
+const OF_ROUNDING: f64 = 1e6;
 /// Strain beyond which small rotations and strains are a caution \[1\].
 const SMALL_STRAIN: f64 = 0.1;
 /// Turn of a cell beyond which they are \[rad\]: 10 degrees, whose cosine is off by 1.5 %.
@@ -287,13 +287,10 @@ impl Mechanics {
         let all: Vec<([f64; 2], f64)> = of_loads.chain(of_supports).collect();
         let force = all.iter().fold([0.0; 2], |sum, (force, _)| plus(sum, *force));
         let moment: f64 = all.iter().map(|(_, moment)| moment).sum();
-        let [loads, supports] = Forces::of(engine).map_or([0.0; 2], |forces| forces.sizes(engine));
+        let [loads, pulls] = Forces::of(engine).map_or([0.0; 2], |forces| forces.loads_and_pulls(engine));
         let resultants: f64 = all.iter().map(|([x, y], _)| x.hypot(*y)).sum();
-        // Of what cancels rounding is left. Reactions of a slender body are many times their resultant, and say nothing of it.
-        let forces = match resultants.max(loads) {
-            forces if forces > CANCELLED * supports => forces,
-            _ => supports,
-        };
+        // Of what cancels rounding is left.
+        let forces = resultants.max(loads).max(OF_ROUNDING * f64::EPSILON * pulls);
         let moments: f64 = all.iter().map(|(_, moment)| moment.abs()).sum();
         let of_force = force[0].hypot(force[1]) / forces.max(moments / arm);
         let of_moment = moment.abs() / moments.max(forces * arm);

@@ -192,10 +192,21 @@ impl Forces {
     }
 
     /// Loads, and reactions, on all particles, sizes added up \[force\].
-    pub(crate) fn sizes(&self, engine: &Engine) -> [f64; 2] {
+    fn sizes(&self, engine: &Engine) -> [f64; 2] {
         let supports = self.supports(engine);
         let of = |i: usize| [&self.loads, &supports].map(|forces| forces.get(i)).map(|[x, y]| x.hypot(y));
         engine.sum_over([0.0; 2], engine.body().owned().map(|i| (i, of(i))))
+    }
+
+    /// Loads on all particles, and what neighbours pull those with that are held, sizes added up \[force\]: rounding of reactions is a
+    /// part of the latter.
+    pub(crate) fn loads_and_pulls(&self, engine: &Engine) -> [f64; 2] {
+        let owned = engine.body().owned();
+        let mut is_held = vec![false; self.internal.len()];
+        held(engine).into_iter().flatten().for_each(|one| is_held[one.particle] = true);
+        let pulls = |i: usize| engine.flock().pulls_under(i, &self.displacement);
+        let load = |i: usize| self.loads.get(i).into_iter().fold(0.0, f64::hypot);
+        engine.sum_over([0.0; 2], owned.map(|i| (i, [load(i), if is_held[i] { pulls(i) } else { 0.0 }])))
     }
 
     /// Followers, and the size of the force that is left on each along components that are free \[force\].

@@ -229,6 +229,19 @@ impl Flock {
         })
     }
 
+    /// What neighbours pull with and push with, sizes added up, when all are displaced by so much \[force\]: what rounding is a part of.
+    pub fn pulls_under(&self, particle: usize, displacement: &Vectors) -> f64 {
+        let Weights::Matrix(weights) = &self.weights else { return 0.0 };
+        let size = |j: usize| displacement.get(j).map(f64::abs);
+        let seen = self.neighbours.of(particle).iter().zip(weights.stiffness_of(particle));
+        let pulls = seen.map(|(&j, block)| {
+            let [here, there] = [size(particle), size(j as usize)];
+            let [x, y] = apply(&block.map(|row| row.map(f64::abs)), [here[0] + there[0], here[1] + there[1]]);
+            x.hypot(y)
+        });
+        pulls.sum()
+    }
+
     fn force_from(&self, particle: usize, corner: impl Fn(usize) -> Corner + Copy) -> [f64; 2] {
         match &self.weights {
             Weights::Matrix(weights) if self.rule.mean == COROTATED => {

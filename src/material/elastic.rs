@@ -282,6 +282,8 @@ impl Elastic {
         let beyond = if are_rectangles { LOCKS_BEYOND } else { LOCKS_BEYOND_ELSEWHERE };
         let locks = most > beyond * least && (!are_rectangles || self.locks_bilinear(angle));
         let strain = match determinant(weights) {
+            // Averaged, the stiffest is resisted as much as the next one, and either may be found.
+            _ if self.averaged.is_some() => "two strains",
             size if size > 0.5 => "a change of area",
             size if size < -0.5 => "a shear",
             _ => STRETCH,

@@ -163,6 +163,8 @@ pub struct Robots {
     ranges: Option<Writer<WireRange>>,
     targets: Reader<WireTarget>,
     count: usize,
+    /// Ranges that wait for the loop at most \[1\].
+    waiting: usize,
     period: u64,
     /// Of more ranges than wait for the loop.
     complaints: Complaints,
@@ -179,18 +181,20 @@ impl Robots {
             ranges: None,
             targets: Reader::open(peer, space, TARGETS, &Capacity::SWARM)?,
             count,
+            waiting: 0,
             period: 0,
             complaints: Complaints::default(),
         })
     }
 
-    /// The same, with rangefinders.
+    /// The same, with rangefinders, in a formation of so many robots.
     ///
     /// # Errors
     /// As [`Writer::open`].
-    pub fn with_ranges(mut self, peer: &Peer, space: &str) -> Result<Self, ShmError> {
-        let at_once = self.count * OTHERS;
-        self.ranges = Some(Writer::open(peer, space, RANGES, &for_ranges(self.count), at_once)?);
+    pub fn with_ranges(mut self, peer: &Peer, space: &str, formation: usize) -> Result<Self, ShmError> {
+        let (at_once, capacity) = (self.count * OTHERS, for_ranges(formation));
+        self.ranges = Some(Writer::open(peer, space, RANGES, &capacity, at_once)?);
+        self.waiting = at_once * capacity.queue;
         Ok(self)
     }
 
@@ -223,7 +227,7 @@ impl RobotsEnd for Robots {
             return Err(ShmError::Send { service: RANGES.to_owned(), reason });
         };
         let at_once = (self.count * OTHERS).max(1);
-        let waiting = at_once * for_ranges(self.count).queue;
+        let waiting = self.waiting;
         if ranges.len() > waiting {
             let text = format_args!(
                 "{}: {} ranges in a period, and {waiting} wait for a node at most: others are lost; give `ranges.reach` less",

@@ -39,7 +39,11 @@ impl SimulatedRobots {
             fleet: Fleet::new(swarm, formation)?,
             pace: Pace::new(1.0 / control.period()),
             goals: vec![None; formation.count()],
-            end: if swarm.raw.ranges.is_some() { end.with_ranges(&peer, &swarm.name)? } else { end },
+            end: if swarm.raw.ranges.is_some() {
+                end.with_ranges(&peer, &swarm.name, formation.count())?
+            } else {
+                end
+            },
             peer,
         })
     }

@@ -52,14 +52,14 @@ pub enum CorotatedError {
     DoubleOnly,
     /// Increments of the way got too small, or there were too many.
     #[error(
-        "the rotations do not settle beyond {:.1} % of the way of leaders and loads ({solves} systems solved{}): {}{}",
+        "the rotations do not settle beyond {:.1} % of the way of leaders and loads ({solves} systems solved{}): {}",
         100.0 * part,
         if *cut_short > 0 { format!(", {cut_short} of them no further than most_iterations allows") } else { String::new() },
         match *solves >= newton::MOST_SOLVES {
             true => "so many are solved at most",
+            false if *cut_short > 0 => "the body snaps, buckles or is torn there, or was never brought to rest",
             false => "the body snaps, buckles or is torn there",
-        },
-        if *cut_short > 0 { ", or was never brought to rest" } else { "" }
+        }
     )]
     Unsettled {
         /// Share of the way of leaders and loads that was reached \[1\].

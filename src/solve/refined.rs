@@ -16,7 +16,7 @@ use super::whole::Whole;
 use crate::flock::body::Body;
 use crate::flock::law::{Flock, Weights};
 use crate::flock::rules::Rule;
-use crate::flock::vectors::Vectors;
+use crate::flock::vectors::{Vectors, distance};
 use crate::geometry::point::{cross, minus, plus};
 use crate::ranks::Team;
 
@@ -29,6 +29,8 @@ const WORTH_IT: f64 = 0.5;
 /// Part of loads and reactions that need not balance \[1\], and the same over the tolerance of the solve.
 const BALANCED: f64 = 1e-7;
 const TOLERATED: f64 = 10.0;
+/// Roundings of what neighbours pull with that need not balance either \[1\].
+const ROUNDINGS: f64 = 16.0;
 
 /// The equilibrium of the `system` of a body under the loads of its `flock`; shared with a team, each rank with a part of the body or
 /// all with the whole of it.
@@ -46,7 +48,8 @@ pub fn solve_refined(
     let Weights::Matrix(weights) = &flock.weights else { return Ok(solved) };
     let whole = Whole::new(body, team.filter(|_| body.part.is_some()));
     let load = |i: usize| flock.forces.as_ref().map_or([0.0; 2], |forces| forces.get(i));
-    if flock.rule != Rule::MATERIAL {
+    let is_cut_off = !solved.converged && solved.residuals.len() > request.most_iterations;
+    if flock.rule != Rule::MATERIAL || is_cut_off {
         return Ok(solved);
     }
     let held = |i: usize| if follows(i) { weights.held(i) } else { [true; 2] };
@@ -99,8 +102,9 @@ pub fn solve_refined(
         last = correction;
     }
     // An iteration does not find what its right-hand side has too little of.
-    solved.known_to = solved.known_to.map(|part| part.max(off(&solved.displacement)));
     solved.converged &= !is_unbalanced(&solved.displacement);
+    let off = off(&solved.displacement);
+    solved.known_to = solved.known_to.filter(|_| !solved.converged).map(|part| part.max(off));
     Ok(solved)
 }
 
@@ -114,15 +118,19 @@ fn out_of_balance(
 ) -> f64 {
     let (low, high) = whole.body.bounds();
     let middle = [0, 1].map(|axis| 0.5 * (low[axis] + high[axis]));
-    let [x, y, moment, forces, moments] = whole.sum(|i| {
+    let [x, y, moment, forces, moments, pulls] = whole.sum(|i| {
         let (mut outer, held) = (load(i), held(i));
-        if held.contains(&true) {
+        let is_held = held.contains(&true);
+        let pulls = if is_held { flock.pulls_under(i, u) } else { 0.0 };
+        if is_held {
             let inner = flock.force_under(i, u);
             (0..2).filter(|&axis| held[axis]).for_each(|axis| outer[axis] = -inner[axis]);
         }
         let moment = cross(minus(flock.reference.get(i), middle), outer);
-        [outer[0], outer[1], moment, outer[0].hypot(outer[1]), moment.abs()]
+        [outer[0], outer[1], moment, outer[0].hypot(outer[1]), moment.abs(), pulls]
     });
-    let of_moment = moment.abs() / moments.max(forces * whole.body.lattice.spacing());
-    (x.hypot(y) / forces).max(of_moment)
+    // Of a body that is only carried about reactions are rounding.
+    let rounding = ROUNDINGS * f64::EPSILON * pulls / BALANCED;
+    let moments = moments.max(forces * whole.body.lattice.spacing()).max(rounding * distance(low, high));
+    (x.hypot(y) / forces.max(rounding)).max(moment.abs() / moments)
 }

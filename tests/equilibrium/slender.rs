@@ -133,3 +133,32 @@ fn a_beam_whose_end_is_led_takes_the_force_of_its_closed_form() {
     // Its iterations do not find so slow a mode: then it says so.
     assert!(!end(1000.0, 1.0, "conjugate-gradients").0);
 }
+
+/// Supports that move turn it about, and reactions are rounding.
+#[test]
+fn a_body_that_is_only_carried_about_is_at_rest() {
+    for solver in ["direct", "multigrid", "conjugate-gradients"] {
+        let text = format!(
+            "title = \"settlement\"\nlattice = {{ kind = \"square\", spacing = 0.05 }}\n\
+             body = {{ shape = {{ kind = \"rectangle\", max = [2.0, 0.5] }} }}\n\
+             material = {{ kind = \"isotropic\", young = 210e9, poisson = 0.3 }}\nrule = {{ mean = {{ kind = \"material\" }} }}\n\
+             equilibrium = {{ solver = \"{solver}\" }}\nstop = {{ steps = 1 }}\n\
+             [[roles]]\nregion = {{ kind = \"disc\", centre = [0.0, 0.0], radius = 0.01 }}\nrole = \"clamped\"\n\
+             [[roles]]\nregion = {{ kind = \"disc\", centre = [2.0, 0.0], radius = 0.01 }}\nrole = \"leader\"\naxis = \"y\"\n\
+             motion = {{ kind = \"velocity\", per_step = [0.0, -0.01] }}\n"
+        );
+        let [end, _] = of_the_end(&text, 2.0);
+        assert!((end + 0.01).abs() < 1e-9, "{solver}: {end}");
+    }
+}
+
+/// What iterations have no time for is not sought by more of them.
+#[test]
+fn a_solve_that_runs_out_of_iterations_is_not_refined() {
+    let shear = "loads = [{ kind = \"traction\", region = { kind = \"edge\", side = \"right\" }, traction = [0.0, 1e-3] }]\n";
+    let text = strip(20.0, 4.0, "conjugate-gradients\", most_iterations = 50, precision = \"f64", shear);
+    let scene = Scene::parse("cut", "cut.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+    let outcome = run_to_equilibrium(&scene, planned(&scene), &mut |_, _| ControlFlow::Continue(()));
+    let solved = outcome.unwrap_or_else(|error| panic!("{error}")).solved.expect("solved");
+    assert_eq!((solved.iterations, solved.converged, solved.known_to), (50, false, None));
+}

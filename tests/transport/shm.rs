@@ -46,7 +46,7 @@ impl Transport for Shm {
         let (count, measures) = (self.count, !self.more.is_empty());
         let peer = self.peer();
         let robots = Robots::open(peer, "row", count).expect("an end");
-        if measures { robots.with_ranges(peer, "row").expect("an end") } else { robots }
+        if measures { robots.with_ranges(peer, "row", count).expect("an end") } else { robots }
     }
 }
 
