@@ -7,7 +7,7 @@ use super::pieces::CellNumbers;
 use super::run::growth;
 use crate::engine::Engine;
 use crate::engine::actions::Stressed;
-use crate::engine::forces::{Forces, LoadResultant, Reaction};
+use crate::engine::forces::{Forces, LoadResultant, Reaction, loads_and_pulls};
 use crate::engine::path::{Path, Work};
 use crate::flock::body::Body;
 use crate::flock::rules::{Mean, Rotation};
@@ -287,7 +287,7 @@ impl Mechanics {
         let all: Vec<([f64; 2], f64)> = of_loads.chain(of_supports).collect();
         let force = all.iter().fold([0.0; 2], |sum, (force, _)| plus(sum, *force));
         let moment: f64 = all.iter().map(|(_, moment)| moment).sum();
-        let [loads, pulls] = Forces::of(engine).map_or([0.0; 2], |forces| forces.loads_and_pulls(engine));
+        let [loads, pulls] = loads_and_pulls(engine);
         let resultants: f64 = all.iter().map(|([x, y], _)| x.hypot(*y)).sum();
         // Of what cancels rounding is left.
         let forces = resultants.max(loads).max(OF_ROUNDING * f64::EPSILON * pulls);

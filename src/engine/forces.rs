@@ -198,17 +198,6 @@ impl Forces {
         engine.sum_over([0.0; 2], engine.body().owned().map(|i| (i, of(i))))
     }
 
-    /// Loads on all particles, and what neighbours pull those with that are held, sizes added up \[force\]: rounding of reactions is a
-    /// part of the latter.
-    pub(crate) fn loads_and_pulls(&self, engine: &Engine) -> [f64; 2] {
-        let owned = engine.body().owned();
-        let mut is_held = vec![false; self.internal.len()];
-        held(engine).into_iter().flatten().for_each(|one| is_held[one.particle] = true);
-        let pulls = |i: usize| engine.flock().pulls_under(i, &self.displacement);
-        let load = |i: usize| self.loads.get(i).into_iter().fold(0.0, f64::hypot);
-        engine.sum_over([0.0; 2], owned.map(|i| (i, [load(i), if is_held[i] { pulls(i) } else { 0.0 }])))
-    }
-
     /// Followers, and the size of the force that is left on each along components that are free \[force\].
     fn left_on_followers(&self, engine: &Engine) -> Vec<(usize, f64)> {
         let mut free = vec![[true; 2]; engine.roles().len()];
@@ -223,6 +212,20 @@ impl Forces {
         let followers = engine.body().owned().filter(|&i| engine.roles()[i] == Role::Follower);
         followers.map(|i| (i, left(i))).collect()
     }
+}
+
+/// Loads on all particles, and what neighbours pull those with that are held, sizes added up \[force\]: rounding of reactions is a
+/// part of the latter.
+pub(crate) fn loads_and_pulls(engine: &Engine) -> [f64; 2] {
+    let (flock, displacement) = (engine.flock(), engine.displacements());
+    let mut is_held = vec![false; displacement.len()];
+    held(engine).into_iter().flatten().for_each(|one| is_held[one.particle] = true);
+    let load = |i: usize| flock.forces.as_ref().map_or([0.0; 2], |forces| forces.get(i));
+    let of = |i: usize| {
+        let [x, y] = load(i);
+        [x.hypot(y), if is_held[i] { flock.pulls_under(i, &displacement) } else { 0.0 }]
+    };
+    engine.sum_over([0.0; 2], engine.body().owned().map(|i| (i, of(i))))
 }
 
 /// A particle that is held along these axes.

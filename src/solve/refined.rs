@@ -55,8 +55,8 @@ pub fn solve_refined(
     let held = |i: usize| if follows(i) { weights.held(i) } else { [true; 2] };
     let off = |u: &Vectors| out_of_balance((flock, &whole), &held, &load, u);
     // Without any force it is no number.
-    let is_unbalanced = |u: &Vectors| off(u) > BALANCED.max(TOLERATED * request.tolerance);
-    if solved.known_to.is_none() && !is_unbalanced(&solved.displacement) {
+    let is_too_much = |off: f64| off > BALANCED.max(TOLERATED * request.tolerance);
+    if solved.known_to.is_none() && !is_too_much(off(&solved.displacement)) {
         return Ok(solved);
     }
     // What it leaves where something is held, the system does not look at.
@@ -102,8 +102,8 @@ pub fn solve_refined(
         last = correction;
     }
     // An iteration does not find what its right-hand side has too little of.
-    solved.converged &= !is_unbalanced(&solved.displacement);
     let off = off(&solved.displacement);
+    solved.converged &= !is_too_much(off);
     solved.known_to = solved.known_to.filter(|_| !solved.converged).map(|part| part.max(off));
     Ok(solved)
 }

@@ -17,7 +17,7 @@ use crate::solve::whole::Whole;
 /// are not met where they began each time.
 const LOOKS: u32 = 7;
 /// Places on a way that no number of turns has in common: multiples of the golden section, without what is whole of them.
-const GOLDEN: f64 = 0.618_033_988_749_895;
+pub(super) const GOLDEN: f64 = 0.618_033_988_749_895;
 /// Parts into which a way is cut at most because leaders turn on it.
 const MOST_PARTS: u32 = 1024;
 /// Leaders go straight on enough where twice as many parts of their way are together no longer than this many times \[1\].

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::body::{Corotated, Local, Stored};
+use super::body::{Corotated, GOLDEN, Local, Stored};
 use super::{CorotatedError, DIRECT};
 use crate::flock::rules::Turn;
 use crate::flock::vectors::Vectors;
@@ -165,7 +165,7 @@ impl<'a> Newton<'a> {
         let force = |(i, local): (usize, &Option<Local>)| {
             let free = rule.free(i).map(|free| free && local.is_some());
             let of_axis = |axis: usize| {
-                let share = (2 * rule.whole.body.index(i) + axis) as f64 * 0.618_033_988_749_895;
+                let share = (2 * rule.whole.body.index(i) + axis) as f64 * GOLDEN;
                 if free[axis] { share.fract() - 0.5 } else { 0.0 }
             };
             [0, 1].map(of_axis)
