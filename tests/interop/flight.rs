@@ -38,8 +38,10 @@ fn robots_of_a_peer_fly_the_manoeuvre_that_the_node_leads() {
     assert!(told["formation_error"].as_f64().is_some_and(|error| error < 1e-9), "{told}");
     let leads = |member: &serde_json::Value| member["role"] == json!(MemberState::LEADER);
     assert_eq!(state::who(&told, leads), ["robot_1", "robot_5", "robot_21", "robot_25"]);
-    let status = watch.until("diagnostics", |line| line.get("diagnostics").cloned());
-    assert_eq!(status["level"], json!(0), "{status}");
+    // A computer that is busy for a moment has the node warn of deadlines for a second.
+    watch.until("diagnostics without a warning", |line| {
+        (line.get("diagnostics")?["level"] == json!(0)).then_some(())
+    });
     assert_eq!(node.terminate(), Some(0));
 }
 

@@ -410,8 +410,13 @@ class Client:
         self.name = name
 
     def call(self, *body):
-        """One request, sent once; the one reply to it."""
-        until(f"{self.name}: a server", lambda: self.requests.get_matched_subscriptions() or None)
+        """One request, sent once, when the server is available as rmw_cyclonedds_cpp has it: both its ends
+        are known. The one reply to it."""
+
+        def available():
+            return (self.requests.get_matched_subscriptions() and self.replies.get_matched_publications()) or None
+
+        until(f"{self.name}: a server", available)
         self.seq += 1
         self.requests.write(self.request(self.guid, self.seq, *body))
 
