@@ -7,12 +7,11 @@ use super::pieces::CellNumbers;
 use super::run::growth;
 use crate::engine::Engine;
 use crate::engine::actions::Stressed;
-use crate::engine::forces::{Forces, LoadResultant, Reaction, loads_and_pulls};
+use crate::engine::forces::{Forces, LoadResultant, Reaction};
 use crate::engine::path::{Path, Work};
 use crate::flock::body::Body;
 use crate::flock::rules::{Mean, Rotation};
-use crate::flock::vectors::{Vectors, distance};
-use crate::geometry::point::plus;
+use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
 use crate::material::stress::{self, AroundParticles, Over, StressState};
@@ -23,8 +22,6 @@ const MISSED_WORK: f64 = 0.05;
 const UNBALANCED: f64 = 0.01;
 /// Strain of a body that has been unloaded again, but for rounding \[1\].
 const UNSTRAINED: f64 = 1e-7;
-/// Roundings of what neighbours pull with that may be all that reactions are \[1\].
-const OF_ROUNDING: f64 = 1e6;
 /// Strain beyond which small rotations and strains are a caution \[1\].
 const SMALL_STRAIN: f64 = 0.1;
 /// Turn of a cell beyond which they are \[rad\]: 10 degrees, whose cosine is off by 1.5 %.
@@ -275,26 +272,6 @@ impl Mechanics {
             ));
         }
         cautions
-    }
-
-    /// The part of reactions and loads, of forces or of moments, by which they are not in balance \[1\]. Whatever the followers are left
-    /// with, a stiffness whose rounding resists turns holds the body by more than its supports.
-    pub fn out_of_balance(&self, engine: &Engine) -> f64 {
-        let (low, high) = engine.body().bounds();
-        let arm = distance(low, high);
-        let of_loads = self.load.iter().map(|load| (load.force, load.moment_about_origin));
-        let of_supports = self.reactions.iter().map(|one| (one.force, one.moment_about_origin));
-        let all: Vec<([f64; 2], f64)> = of_loads.chain(of_supports).collect();
-        let force = all.iter().fold([0.0; 2], |sum, (force, _)| plus(sum, *force));
-        let moment: f64 = all.iter().map(|(_, moment)| moment).sum();
-        let [loads, pulls] = loads_and_pulls(engine);
-        let resultants: f64 = all.iter().map(|([x, y], _)| x.hypot(*y)).sum();
-        // Of what cancels rounding is left.
-        let forces = resultants.max(loads).max(OF_ROUNDING * f64::EPSILON * pulls);
-        let moments: f64 = all.iter().map(|(_, moment)| moment.abs()).sum();
-        let of_force = force[0].hypot(force[1]) / forces.max(moments / arm);
-        let of_moment = moment.abs() / moments.max(forces * arm);
-        of_force.max(of_moment)
     }
 
     /// The part of the loads, or without loads of the reactions, that the followers are not in balance with \[1\], if it is

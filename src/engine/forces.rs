@@ -214,20 +214,6 @@ impl Forces {
     }
 }
 
-/// Loads on all particles, and what neighbours pull those with that are held, sizes added up \[force\]: rounding of reactions is a
-/// part of the latter.
-pub(crate) fn loads_and_pulls(engine: &Engine) -> [f64; 2] {
-    let (flock, displacement) = (engine.flock(), engine.displacements());
-    let mut is_held = vec![false; displacement.len()];
-    held(engine).into_iter().flatten().for_each(|one| is_held[one.particle] = true);
-    let load = |i: usize| flock.forces.as_ref().map_or([0.0; 2], |forces| forces.get(i));
-    let of = |i: usize| {
-        let [x, y] = load(i);
-        [x.hypot(y), if is_held[i] { flock.pulls_under(i, &displacement) } else { 0.0 }]
-    };
-    engine.sum_over([0.0; 2], engine.body().owned().map(|i| (i, of(i))))
-}
-
 /// A particle that is held along these axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Held {

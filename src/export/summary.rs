@@ -269,16 +269,12 @@ impl Summary {
             equilibrium: outcome.solved.as_ref().map(Equilibrium::of),
             energies: Energies { pe1, pe2, largest_strain },
             is_short_of_rest: balance.is_some() && !is_tied,
-            cautions: [
-                balance,
-                of_contrast(scene, &outcome.reason),
-                unbalanced(scene, outcome, measured.as_ref()),
-            ]
-            .into_iter()
-            .flatten()
-            .chain(cautions(scene, outcome, measured.as_ref()))
-            .chain(may_grow.then(|| growing(engine, largest_strain.unwrap_or(0.0))).flatten())
-            .collect(),
+            cautions: [balance, ended_short(scene, outcome)]
+                .into_iter()
+                .flatten()
+                .chain(cautions(scene, outcome, measured.as_ref()))
+                .chain(may_grow.then(|| growing(engine, largest_strain.unwrap_or(0.0))).flatten())
+                .collect(),
             mechanics: measured,
             broken_bonds: broken_bonds(&outcome.engine),
             timings,
@@ -344,34 +340,30 @@ fn ties_to_reference(scene: &Scene) -> bool {
     scene.feedback.is_some_and(|feedback| feedback.ties_to_reference())
 }
 
-/// Part of reactions and loads that need not balance, and the same in units of the tolerance of the solve \[1\].
-const BALANCED: f64 = 1e-4;
-const TOLERATED: f64 = 100.0;
-
-/// Says that an equilibrium is held by what rounding makes of its stiffness; found by all ranks together.
-fn unbalanced(scene: &Scene, outcome: &Outcome, measured: Option<&Measured>) -> Option<String> {
-    let asked =
-        scene.equilibrium.as_ref().filter(|_| outcome.solved.is_some() && !ties_to_reference(scene))?;
-    let off =
-        measured.filter(|_| scene.rotation() == Rotation::Small)?.mechanics.out_of_balance(&outcome.engine);
-    (off > BALANCED.max(TOLERATED * asked.request.tolerance)).then(|| {
-        format!(
-            "reactions and loads are out of balance by {off:.1e} of their size: what rounding, or the tolerance of the solver, leaves holds so slender, or \
-             so uneven, a body as supports do, and its displacements are off by as much; use another equilibrium.solver, rotation = \"corotated\", which leaves turns out, or a wider spacing"
-        )
-    })
-}
-
-/// The likely cause of a solve that ended short of its tolerance, where a body is of several materials.
-fn of_contrast(scene: &Scene, reason: &StopReason) -> Option<String> {
+/// The likely cause of a solve that ended short of its tolerance, where there is one.
+fn ended_short(scene: &Scene, outcome: &Outcome) -> Option<String> {
+    if outcome.reason != StopReason::Unsettled {
+        return None;
+    }
     let all = scene.material.iter().chain(scene.inclusions.iter().map(|part| &part.material));
     let stiffness = all.map(|elastic| elastic.stiffness()[(2, 2)]);
     let range = stiffness.fold([f64::INFINITY, 0.0], |[low, high], own| [own.min(low), own.max(high)]);
     let contrast = range[1] / range[0];
-    (*reason == StopReason::Unsettled && contrast > MOST_CONTRAST).then(|| {
-        format!(
+    if contrast > MOST_CONTRAST {
+        return Some(format!(
             "the stiffest material is {contrast:.0e} times as stiff as the softest, which likely keeps the solver from \
              its tolerance: bring the stiffnesses closer together"
+        ));
+    }
+    let is_rounding = scene.material.is_some() && outcome.solved.as_ref()?.known_to.is_some();
+    let other = match scene.rotation() {
+        Rotation::Small => "rule.mean.rotation = \"corotated\", which leaves turns out, ",
+        Rotation::Corotated => "",
+    };
+    is_rounding.then(|| {
+        format!(
+            "what rounding leaves of the stiffness of so slender a body holds it as supports do: use {other}another \
+             equilibrium.solver, or a wider spacing"
         )
     })
 }

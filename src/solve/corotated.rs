@@ -165,9 +165,9 @@ pub fn solve(
     let mut newton = Newton::new(&rule);
     let displacement = if newton.size == 0.0 { (way.held)(way.end) } else { newton.go(tolerance)? };
     let residuals = if newton.size == 0.0 { vec![0.0] } else { newton.residuals };
-    let converged = residuals.last().is_some_and(|last| *last <= 2.0 * tolerance);
+    let converged = newton.off.is_none() && residuals.last().is_some_and(|last| *last <= 2.0 * tolerance);
     // Where rounding has the last word, the last step is made of what it left.
-    let known_to = (!converged).then_some(newton.last_step);
+    let known_to = (!converged).then_some(newton.last_step.max(newton.off.unwrap_or(0.0)));
     let phases = vec![("set-up", newton.times[0]), ("solve", newton.times[1])];
     Ok(Solved {
         displacement,

@@ -2,6 +2,7 @@
 
 pub mod affine_weights;
 pub(crate) mod arnoldi;
+mod balance;
 pub mod corotated;
 pub mod equilibrium;
 pub(crate) mod field;

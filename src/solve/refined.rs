@@ -6,18 +6,18 @@
 //! they leave is solved for again (iterative refinement; N. J. Higham, *Accuracy and Stability of Numerical Algorithms*, 2002,
 //! chapter 12).
 //!
-//! Where a tolerance was not reached that is known. Where it was, loads and reactions say whether it was enough: it is a part of the force
-//! that leaders would need with all followers at zero, which in a slender body is many times what they do need.
+//! Where a tolerance was not reached that is known. Where it was, loads and reactions say whether it was enough ([`super::balance`]).
 
 use rayon::prelude::*;
 
+use super::balance::{Outer, is_too_much};
 use super::equilibrium::{Choice, Request, SolveError, Solved, System, solve_shared};
 use super::whole::Whole;
 use crate::flock::body::Body;
 use crate::flock::law::{Flock, Weights};
 use crate::flock::rules::Rule;
-use crate::flock::vectors::{Vectors, distance};
-use crate::geometry::point::{cross, minus, plus};
+use crate::flock::vectors::Vectors;
+use crate::geometry::point::plus;
 use crate::ranks::Team;
 
 /// Solves after the first one, at most.
@@ -26,11 +26,6 @@ const MOST: usize = 8;
 const OF_WHAT_IS_LEFT: f64 = 1e-3;
 /// Part of a correction that the next one may be, lest the system have too few digits to find it.
 const WORTH_IT: f64 = 0.5;
-/// Part of loads and reactions that need not balance \[1\], and the same over the tolerance of the solve.
-const BALANCED: f64 = 1e-7;
-const TOLERATED: f64 = 10.0;
-/// Roundings of what neighbours pull with that need not balance either \[1\].
-const ROUNDINGS: f64 = 16.0;
 
 /// The equilibrium of the `system` of a body under the loads of its `flock`; shared with a team, each rank with a part of the body or
 /// all with the whole of it.
@@ -53,10 +48,11 @@ pub fn solve_refined(
         return Ok(solved);
     }
     let held = |i: usize| if follows(i) { weights.held(i) } else { [true; 2] };
-    let off = |u: &Vectors| out_of_balance((flock, &whole), &held, &load, u);
-    // Without any force it is no number.
-    let is_too_much = |off: f64| off > BALANCED.max(TOLERATED * request.tolerance);
-    if solved.known_to.is_none() && !is_too_much(off(&solved.displacement)) {
+    let off = |u: &Vectors| {
+        let (inner, place) = (|i: usize| flock.force_under(i, u), |i: usize| flock.reference.get(i));
+        Outer::of((flock, &whole), held, load, inner, place, u).off(None)
+    };
+    if solved.known_to.is_none() && !is_too_much(off(&solved.displacement), request.tolerance) {
         return Ok(solved);
     }
     // What it leaves where something is held, the system does not look at.
@@ -103,34 +99,7 @@ pub fn solve_refined(
     }
     // An iteration does not find what its right-hand side has too little of.
     let off = off(&solved.displacement);
-    solved.converged &= !is_too_much(off);
+    solved.converged &= !is_too_much(off, request.tolerance);
     solved.known_to = solved.known_to.filter(|_| !solved.converged).map(|part| part.max(off));
     Ok(solved)
-}
-
-/// The part of loads and reactions, of forces or of moments, by which they are not in balance \[1\]; reactions are those of the
-/// components that are `held`.
-fn out_of_balance(
-    (flock, whole): (&Flock, &Whole<'_>),
-    held: &dyn Fn(usize) -> [bool; 2],
-    load: &dyn Fn(usize) -> [f64; 2],
-    u: &Vectors,
-) -> f64 {
-    let (low, high) = whole.body.bounds();
-    let middle = [0, 1].map(|axis| 0.5 * (low[axis] + high[axis]));
-    let [x, y, moment, forces, moments, pulls] = whole.sum(|i| {
-        let (mut outer, held) = (load(i), held(i));
-        let is_held = held.contains(&true);
-        let pulls = if is_held { flock.pulls_under(i, u) } else { 0.0 };
-        if is_held {
-            let inner = flock.force_under(i, u);
-            (0..2).filter(|&axis| held[axis]).for_each(|axis| outer[axis] = -inner[axis]);
-        }
-        let moment = cross(minus(flock.reference.get(i), middle), outer);
-        [outer[0], outer[1], moment, outer[0].hypot(outer[1]), moment.abs(), pulls]
-    });
-    // Of a body that is only carried about reactions are rounding.
-    let rounding = ROUNDINGS * f64::EPSILON * pulls / BALANCED;
-    let moments = moments.max(forces * whole.body.lattice.spacing()).max(rounding * distance(low, high));
-    (x.hypot(y) / forces.max(rounding)).max(moment.abs() / moments)
 }

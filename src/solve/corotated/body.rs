@@ -3,11 +3,12 @@
 use rayon::prelude::*;
 
 use super::Way;
-use crate::flock::block::{Block, apply, plus};
+use crate::flock::block::{self, Block, apply};
 use crate::flock::law::{Flock, MatrixWeights};
 use crate::flock::rules::{Corner, OWN, Turn, patch_row};
 use crate::flock::vectors::Vectors;
-use crate::geometry::point::{distance, dot, minus};
+use crate::geometry::point::{distance, dot, minus, plus};
+use crate::solve::balance::Outer;
 use crate::solve::equilibrium::{Request, System};
 use crate::solve::operator::{Operator, OperatorError, Row};
 use crate::solve::order::Order;
@@ -47,6 +48,8 @@ pub(super) struct Stored {
     forces: Vectors,
     /// Strain energy of the whole body \[force length\].
     energy: f64,
+    /// The part of the way after which it is.
+    part: f64,
 }
 
 /// Force and stiffness of the cells around a particle.
@@ -85,7 +88,7 @@ impl Corotated<'_> {
             energy += row.energy / cell.element.corners() as f64;
             for (&slot, block) in cell.slots.iter().zip(&row.tangent) {
                 let sum = if slot == OWN { &mut diagonal } else { &mut blocks[slot as usize] };
-                *sum = plus(sum, block);
+                *sum = block::plus(sum, block);
             }
             turn = turn.or(Some(row.turn));
         }
@@ -95,7 +98,7 @@ impl Corotated<'_> {
             energy += row.energy / row.tangent.len() as f64;
             for (slot, block) in row.tangent {
                 let sum = if slot == OWN { &mut diagonal } else { &mut blocks[slot as usize] };
-                *sum = plus(sum, &block);
+                *sum = block::plus(sum, &block);
             }
         }
         Some(Local { force, energy, diagonal, blocks, turn: turn? })
@@ -217,7 +220,7 @@ impl Corotated<'_> {
     }
 
     /// A state on the way, or `None` where a cell has no direction left.
-    pub fn stored(&self, displacement: Vectors) -> Option<Stored> {
+    pub fn stored(&self, displacement: Vectors, part: f64) -> Option<Stored> {
         let owned = self.whole.body.owned();
         let of_particle = |i: usize| match owned.contains(&i) {
             true => self.local(i, &displacement).map(|local| (local.force, local.energy)),
@@ -225,7 +228,24 @@ impl Corotated<'_> {
         };
         let own = self.of_all(of_particle)?;
         let [energy] = self.whole.sum(|i| [own[i].1]);
-        Some(Stored { forces: own.into_iter().map(|(force, _)| force).collect(), energy, displacement })
+        Some(Stored { forces: own.into_iter().map(|(force, _)| force).collect(), energy, displacement, part })
+    }
+
+    /// What acts on the body from outside in a state on the way.
+    pub fn outer(&self, state: &Stored) -> Outer {
+        self.outer_with((&state.displacement, state.part), |i| state.forces.get(i))
+    }
+
+    /// The same where it has been displaced by so much after a part of the way.
+    pub fn outer_at(&self, displacement: &Vectors, part: f64) -> Outer {
+        self.outer_with((displacement, part), |i| self.flock.force_under(i, displacement))
+    }
+
+    fn outer_with(&self, (u, part): (&Vectors, f64), inner: impl Fn(usize) -> [f64; 2]) -> Outer {
+        let held = |i: usize| self.free(i).map(|free| !free);
+        let load = |i: usize| self.load(i).map(|load| part * load);
+        let place = |i: usize| plus(self.flock.reference.get(i), u.get(i));
+        Outer::of((self.flock, &self.whole), held, load, inner, place, u)
     }
 
     /// Whether the body is given as much work between two states as it stores: what is too much sets it swinging, so that

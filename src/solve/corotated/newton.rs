@@ -7,6 +7,7 @@ use super::{CorotatedError, DIRECT};
 use crate::flock::rules::Turn;
 use crate::flock::vectors::Vectors;
 use crate::geometry::point::minus;
+use crate::solve::balance::is_too_much;
 use crate::solve::equilibrium::{Request, SolveError, Solved, solve_shared};
 use crate::solve::linear::NotLinear;
 use crate::solve::stopwatch::Stopwatch;
@@ -38,6 +39,9 @@ pub(super) struct Newton<'a> {
     pub times: [Duration; 2],
     /// Size of the last step over that of the displacements \[1\].
     pub last_step: f64,
+    /// The part by which loads and reactions at the end of the way are not in balance, or another step would change the
+    /// displacements, if it is too much \[1\].
+    pub off: Option<f64>,
     /// Systems of steps of which the iterations that were asked for came to no end.
     cut_short: usize,
 }
@@ -50,6 +54,7 @@ impl<'a> Newton<'a> {
             residuals: vec![1.0],
             times: [Duration::ZERO; 2],
             last_step: f64::INFINITY,
+            off: None,
             cut_short: 0,
         }
     }
@@ -64,7 +69,7 @@ impl<'a> Newton<'a> {
             let (part, solves, cut_short) = (way.part(done), newton.residuals.len() - 1, newton.cut_short);
             CorotatedError::Unsettled { part, solves, cut_short }
         };
-        let mut here = self.rule.stored(start).ok_or_else(|| unsettled(done, self))?;
+        let mut here = self.rule.stored(start, way.part(done)).ok_or_else(|| unsettled(done, self))?;
         while done < 1.0 {
             let next = done + stride.min(longest);
             let part = if next < WHOLE { next } else { 1.0 };
@@ -99,13 +104,18 @@ impl<'a> Newton<'a> {
         let turns: Vec<Option<Turn>> = locals.iter().map(|l| l.as_ref().map(|l| l.turn)).collect();
         let (mut best, mut stalled) = (f64::INFINITY, 0);
         let (mut is_settled, mut is_rounding) = (false, false);
+        let before = (goal < ON_THE_WAY).then(|| (rule.outer(from), rule.whole.norm(&from.displacement)));
+        let mut last = f64::INFINITY;
         for _ in 0..MOST_STEPS {
             let led = std::mem::replace(&mut led, Vectors::zeros(now.len()));
-            match self.step(&mut u, (&locals, left), led) {
+            let step = match self.step(&mut u, (&locals, left), led) {
                 // There is nothing left that another step could find.
                 Err(CorotatedError::Solve(SolveError::NotPositive { .. })) if is_rounding => break,
                 stepped => stepped?,
-            }
+            };
+            // As much less as this one is than the last.
+            let next = step * (step / last).min(1.0);
+            last = step;
             rule.hold(&mut u, &now);
             let Some(found) = rule.forces(&u, after) else { return Ok(None) };
             (locals, left) = found;
@@ -119,8 +129,16 @@ impl<'a> Newton<'a> {
             is_rounding = residual <= rounding && self.last_step <= ON_THE_WAY;
             let is_enough = residual <= goal.max(ON_THE_WAY) || is_rounding;
             is_settled |= is_enough;
+            self.off = None;
             if residual <= goal || (is_rounding && stalled >= STALLED) {
-                break;
+                let off = before.as_ref().map(|(before, way)| {
+                    let of_forces = rule.outer_at(&u, after).off(Some(before));
+                    of_forces.max(next / rule.whole.norm(&u).max(*way))
+                });
+                self.off = off.filter(|&off| is_too_much(off, goal));
+                if self.off.is_none() || stalled >= STALLED {
+                    break;
+                }
             }
             if residual.is_nan() || residual > 1e6 {
                 return Ok(None);
@@ -136,27 +154,28 @@ impl<'a> Newton<'a> {
         let sees = rule.question.solver == rule.step.solver;
         let is_seen = sees && self.last_step <= NEAR && (is_rounding || rule.step.solver == DIRECT);
         let is_taken = is_settled && !is_far && (is_seen || self.is_stable(&locals)?);
-        let found = if is_taken { rule.stored(u) } else { None };
+        let found = if is_taken { rule.stored(u, after) } else { None };
         Ok(found.filter(|found| rule.keeps_energy(from, found)))
     }
 
-    /// One step of Newton's method, the leaders moving by `led`.
+    /// One step of Newton's method, the leaders moving by `led`; its size \[length\].
     fn step(
         &mut self,
         u: &mut Vectors,
         (locals, left): (&[Option<Local>], Vectors),
         led: Vectors,
-    ) -> Result<(), CorotatedError> {
+    ) -> Result<f64, CorotatedError> {
         let rule = self.rule;
         let solved = self.solved(locals, [left, led], &rule.step)?;
         let is_spent = solved.residuals.len() > rule.step.most_iterations;
         self.cut_short += usize::from(is_spent && !solved.converged);
-        self.last_step = rule.whole.norm(&solved.displacement) / rule.whole.norm(u).max(f64::MIN_POSITIVE);
+        let step = rule.whole.norm(&solved.displacement);
+        self.last_step = step / rule.whole.norm(u).max(f64::MIN_POSITIVE);
         for (i, by) in solved.displacement.iter().enumerate() {
             let at = u.get(i);
             u.set(i, [at[0] + by[0], at[1] + by[1]]);
         }
-        Ok(())
+        Ok(step)
     }
 
     /// Whether the energy has a minimum here: whether forces without any symmetry are borne.
