@@ -4,12 +4,14 @@
 
 mod alone;
 mod bridge;
+mod detours;
 mod faults;
 mod files;
 mod flights;
 #[path = "../common/folders.rs"]
 mod folders;
 mod late;
+mod liars;
 mod ranges;
 #[path = "../common/scenes.rs"]
 mod scenes;
