@@ -162,6 +162,32 @@ mod tests {
     }
 
     #[test]
+    fn a_particle_that_is_put_somewhere_stays_there_until_a_program_leads_it() {
+        let sheet = Builder::new(LatticeKind::Square { spacing: 1.0 }).grid(6, 3).clamp(Side::Left);
+        let held = sheet.clone().clamp(Side::Right).scene().expect("a scene");
+        let led = "roles=[{ region = { kind = \"edge\", side = \"right\" }, role = \"leader\", \
+                   motion = { kind = \"velocity\", per_step = [0.1, 0.0] } }, \
+                   { region = { kind = \"edge\", side = \"right\" }, role = \"clamped\", from = 6 }]";
+        let led = sheet.set(led).scene().expect("a scene");
+        for (scene, at) in [(held, 0), (led, 5)] {
+            for is_seen in [false, true] {
+                let mut engine = Engine::new(Plan::new(&scene).expect("laid out").setup);
+                (0..at).for_each(|_| engine.advance());
+                let (particle, place) = (17, [9.0, 1.0]);
+                engine.lead(particle, place);
+                if is_seen {
+                    engine.advance();
+                    engine.observe([(particle, place)]);
+                }
+                for _ in 0..4 {
+                    engine.advance();
+                    assert_eq!(engine.present().get(particle), place, "step {}", engine.step());
+                }
+            }
+        }
+    }
+
+    #[test]
     fn every_lattice_is_that_of_the_bundled_scene() {
         let kinds = [
             ("lattice-square", LatticeKind::Square { spacing: 1.0 }),

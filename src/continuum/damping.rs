@@ -1,8 +1,8 @@
-//! How much a synchronous update of a fitted body must be damped.
+//! How much a synchronous update must be damped along the edges of a body.
 //!
-//! Inside, the waves on the lattice say how far an update may go. Along the outline cells have other shapes, and the
-//! largest eigenvalue of `D^-1 K` may be larger: it belongs to a motion of a few particles there, which a power
-//! iteration over the particles near the outline finds.
+//! Inside, the waves on the lattice say how far an update may go. Along the outline of a fitted body cells have other shapes, and
+//! along any edge fewer of them share a mean dilatation: the largest eigenvalue of `D^-1 K` may be larger. It belongs to a
+//! motion of a few particles there, which a power iteration over those near the edges finds.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -14,7 +14,7 @@ use crate::flock::law::MatrixWeights;
 use crate::flock::neighbourhood::Neighbours;
 use crate::ranks::Team;
 
-/// Rings of neighbours around the particles along the outline that the iteration covers.
+/// Rings of neighbours around the particles along the edges that the iteration covers.
 const RINGS: usize = 2;
 const ITERATIONS: usize = 60;
 /// Factor on the result of the iteration, which approaches the eigenvalue from below.
@@ -22,19 +22,21 @@ const SAFETY: f64 = 1.03;
 /// Part of the largest damping at which nothing grows.
 const OF_LIMIT: f64 = 0.9;
 
-/// The damping of a synchronous update, at most `inside` \[1\], which suits the inside of the body. Of a body of which each rank has
-/// a part all find it together.
-pub fn along_outline(
+/// The damping of a synchronous update, at most `inside` \[1\], which suits the inside of the body. Where particles share means with those
+/// around them, `all` is how many neighbours one inside has. Of a body of which each rank has a part all find it together.
+pub fn along_edges(
     body: &Body,
     neighbours: &Neighbours,
     weights: &MatrixWeights,
-    inside: f64,
+    (inside, all): (f64, Option<usize>),
     team: Option<&Team>,
 ) -> f64 {
-    if body.outline.is_none() {
+    if body.outline.is_none() && all.is_none() {
         return inside;
     }
-    let is_along = |i: usize| body.sites[i][0] == Body::ALONG_OUTLINE;
+    let is_along = |i: usize| {
+        body.sites[i][0] == Body::ALONG_OUTLINE || all.is_some_and(|all| neighbours.of(i).len() < all)
+    };
     let here = rings((0..body.count()).filter(|&i| is_along(i)), |i| {
         Some(neighbours.of(i).iter().map(|&j| j as usize))
     });

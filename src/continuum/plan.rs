@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
 use super::among::{Among, followed, require_loaded};
-use super::damping::along_outline;
+use super::damping::along_edges;
 use super::layout::Layout;
 use super::layout::refusals::refuse_pieces;
 use super::layout::regions::no_particle;
@@ -450,9 +450,23 @@ fn hold_components(weights: &mut MatrixWeights, held: &[HeldComponent]) {
 /// undiminished it does not settle, 0.95 settles after growing tenfold, 0.75 at once.
 const OF_TURNED_CELLS: f64 = 0.75;
 
-/// The update as written; unless its damping is, a fitted body's is what its outline allows, and less where cells turn. Of a part
-/// all ranks find it together.
+/// The update of a body, which is not asked for where a solver finds it at rest.
 pub(super) fn update(
+    scene: &Scene,
+    body: &Body,
+    neighbours: &Neighbours,
+    weights: &Weights,
+    team: Option<&Team>,
+) -> Update {
+    if scene.equilibrium.is_some() {
+        return scene.update;
+    }
+    update_of_steps(scene, body, neighbours, weights, team)
+}
+
+/// The update as written; unless its damping is, a material's is what the edges of the body allow, and less where cells turn. Of a part
+/// all ranks find it together.
+pub(crate) fn update_of_steps(
     scene: &Scene,
     body: &Body,
     neighbours: &Neighbours,
@@ -461,15 +475,19 @@ pub(super) fn update(
 ) -> Update {
     let Update { order, damping } = scene.update;
     let is_open = scene.raw.update.damping.is_none() && order == Order::Synchronous;
-    match weights {
-        Weights::Matrix(weights) if is_open && scene.equilibrium.is_none() => {
-            let turned = if weights.cells.is_some() { OF_TURNED_CELLS } else { 1.0 };
-            let over = scene.over_relaxation().max(1.0);
-            let along = along_outline(body, neighbours, weights, damping * over, team) / over;
-            Update { order, damping: turned * along }
-        }
-        _ => scene.update,
+    let Weights::Matrix(weights) = weights else { return scene.update };
+    if !is_open {
+        return scene.update;
     }
+    let mut materials = scene.material.iter().chain(scene.inclusions.iter().map(|part| &part.material));
+    let shares_means = materials.any(|elastic| elastic.averaged().is_some());
+    // A neighbourhood that cannot be listed has been refused.
+    let offsets = shares_means.then(|| scene.neighbourhood.offsets(&body.lattice).ok()).flatten();
+    let all = offsets.and_then(|offsets| offsets.iter().map(Vec::len).max());
+    let turned = if weights.cells.is_some() { OF_TURNED_CELLS } else { 1.0 };
+    let over = scene.over_relaxation().max(1.0);
+    let along = along_edges(body, neighbours, weights, (damping * over, all), team) / over;
+    Update { order, damping: turned * along }
 }
 
 fn flock(

@@ -319,7 +319,7 @@ fn cause_in_sweep(engine: &Engine) -> Option<String> {
         return (is_synchronous && overshoots(engine)).then(|| {
             format!(
                 "a material swept synchronously with damping = {damping:.3} lets its shortest waves grow; use a smaller \
-                 update.damping, or leave it out"
+                 update.damping, or update.order = \"sequential\""
             )
         });
     }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::setup::RoleChange;
 use super::{Before, Engine};
 use crate::flock::condition::Quantity;
+use crate::flock::role::Role;
 use crate::flock::vectors::distance;
 
 /// A particle under a leader's program.
@@ -26,6 +27,15 @@ impl Led {
         let [dx, dy] = motion.displacement((step - self.since) as f64, self.which, self.base);
         Some([self.base[0] + dx, self.base[1] + dy])
     }
+}
+
+/// A particle that is put somewhere from outside, as long as no program leads it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Guided {
+    pub particle: usize,
+    pub place: [f64; 2],
+    /// Whether it is there in one of the two sets of places that steps lead between.
+    pub is_there: bool,
 }
 
 impl Engine {
@@ -176,9 +186,25 @@ impl Engine {
                 self.previous.set(led.particle, place);
             }
         }
-        for (particle, place) in self.guided.drain(..) {
-            self.previous.set(particle, place);
-        }
+        let mut guided = std::mem::take(&mut self.guided);
+        guided.retain_mut(|&mut Guided { particle, place, ref mut is_there }| {
+            let (was_there, has_program) = (std::mem::replace(is_there, true), self.has_program(particle));
+            if !(was_there && has_program) {
+                self.previous.set(particle, place);
+            }
+            !was_there && !has_program
+        });
+        self.guided = guided;
+    }
+
+    fn has_program(&self, particle: usize) -> bool {
+        self.leaders.binary_search_by_key(&particle, |led| led.particle).is_ok()
+    }
+
+    /// Whether nothing moves a particle but what puts it somewhere from outside.
+    pub(super) fn stays(&self, particle: usize) -> bool {
+        let is_swept = matches!(self.roles[particle], Role::Follower | Role::Frame);
+        !is_swept && !self.has_program(particle)
     }
 
     fn quantity(&self, quantity: Quantity, particle: usize) -> f64 {

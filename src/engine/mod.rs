@@ -32,7 +32,6 @@ use crate::flock::law::Flock;
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::pseudo_energy::{pe1, pe2};
 use crate::flock::role::Role;
-use crate::flock::rules::Rule;
 use crate::flock::strain::{Strain, strain};
 use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
@@ -42,7 +41,7 @@ use crate::ranks::Team;
 use crate::sweep::domain::Share;
 use crate::sweep::{Activity, Order, Sweep, Update};
 use actions::Solid;
-use leaders::Led;
+use leaders::{Guided, Led};
 use load::Load;
 use movement::Movement;
 use path::Path;
@@ -74,7 +73,7 @@ pub struct Engine {
     /// Single components that are led, by axis.
     led_components: Vec<(Led, usize)>,
     /// Where particles that are led from outside will be after the next step.
-    guided: Vec<(usize, [f64; 2])>,
+    guided: Vec<Guided>,
     present: Vectors,
     /// The positions before the last step; the next ones are written over them.
     previous: Vectors,
@@ -342,6 +341,9 @@ impl Engine {
         self.settled = None;
         for (particle, place) in seen {
             self.present.set(particle, place);
+            if self.stays(particle) {
+                self.guided.push(Guided { particle, place, is_there: true });
+            }
         }
         self.activity.forget();
         if let Some(frame) = self.body.frame.as_ref().filter(|frame| !frame.rule.looks_before_the_sweep()) {
@@ -350,14 +352,18 @@ impl Engine {
         }
     }
 
-    /// Leads a particle that has no program of its own to `place` \[length\] in the next step.
+    /// Puts a leader or a clamped particle at `place` \[length\] in the next step. There it stays, unless a program of its own leads it on; a
+    /// follower is not to be led.
+    ///
+    /// # Panics
+    /// If there is no such particle.
     pub fn lead(&mut self, particle: usize, place: [f64; 2]) {
-        self.guided.push((particle, place));
+        assert!(particle < self.roles.len(), "particle {particle} of {}", self.roles.len());
+        self.guided.push(Guided { particle, place, is_there: false });
     }
 
-    /// Follows by another rule from the next step on.
-    pub fn set_rule(&mut self, rule: Rule, damping: f64) {
-        self.flock.rule = rule;
+    /// Goes another part of the way to each target from the next step on \[1\].
+    pub fn set_damping(&mut self, damping: f64) {
         self.update.damping = damping;
         self.compile_sweep();
     }

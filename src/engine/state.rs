@@ -9,7 +9,7 @@ use std::collections::HashSet;
 use serde::{Deserialize, Serialize};
 
 use super::Engine;
-use super::leaders::Led;
+use super::leaders::{Guided, Led};
 use super::serde_impls;
 use super::setup::Setup;
 use crate::flock::fracture::Break;
@@ -32,7 +32,7 @@ pub struct EngineState<'a> {
     /// Of each particle the last change that has taken it; empty where no change has a condition.
     taken_by: Cow<'a, [u32]>,
     leaders: Vec<Led>,
-    guided: Cow<'a, [(usize, [f64; 2])]>,
+    guided: Cow<'a, [Guided]>,
     #[serde(with = "serde_impls::breaks")]
     breaks: Cow<'a, [Break]>,
     /// Where something moved in the last step, and what was swept so far.
@@ -221,8 +221,8 @@ impl<'a> EngineState<'a> {
         // Found by bisection.
         let disordered = self.leaders.windows(2).filter(|pair| pair[0].particle >= pair[1].particle);
         require("leaders out of order", disordered.count(), 0)?;
-        for (particle, _) in self.guided.iter() {
-            require_below("guided particles", *particle, count)?;
+        for one in self.guided.iter() {
+            require_below("guided particles", one.particle, count)?;
         }
         for particle in self.breaks.iter().flat_map(|one| one.pair) {
             require_below("particles of broken bonds", particle as usize, engine.body.total())?;

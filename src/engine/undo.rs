@@ -1,7 +1,7 @@
 //! A step taken back: the engine is again what it was before, to the bit.
 
 use super::Engine;
-use super::leaders::Led;
+use super::leaders::{Guided, Led};
 use super::state::{bits_of, is_set};
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
@@ -15,7 +15,7 @@ pub(crate) struct Before {
     pub(super) places: Vectors,
     settled: Option<Vectors>,
     activity: Activity,
-    guided: Vec<(usize, [f64; 2])>,
+    guided: Vec<Guided>,
     /// Number of bonds broken.
     breaks: usize,
     /// Roles, where particles take others.

@@ -31,13 +31,11 @@ fn main() -> Result<(), SceneError> {
         // Where a hand, or anything else, has the held side now.
         let time = f64::from(number) / f64::from(FRAMES);
         let by = [0.5 * time.sin(), (2.0 * time).sin()];
-        for _ in 0..STEPS_A_FRAME {
-            for &particle in &held {
-                let [x, y] = reference.get(particle);
-                engine.lead(particle, [x + by[0], y + by[1]]);
-            }
-            engine.advance();
+        for &particle in &held {
+            let [x, y] = reference.get(particle);
+            engine.lead(particle, [x + by[0], y + by[1]]);
         }
+        (0..STEPS_A_FRAME).for_each(|_| engine.advance());
         // Here a program draws `engine.present()`.
         busy += begun.elapsed();
         std::thread::sleep(frame.saturating_sub(begun.elapsed()));

@@ -1,6 +1,5 @@
 //! `flockform.Body`: a body that Python steps, leads and reads.
 
-use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use numpy::PyArrayDyn;
@@ -16,6 +15,7 @@ use super::source::Source;
 use super::threads::{Threads, here};
 use crate::continuum::equilibrium::{run_to_equilibrium_watched, solve_equilibrium};
 use crate::continuum::mechanics::{Mechanics, Stresses};
+use crate::continuum::plan::update_of_steps;
 use crate::continuum::run::{Divergence, Outcome, StopReason, overflow};
 use crate::engine::Engine;
 use crate::engine::forces::Forces;
@@ -37,16 +37,26 @@ const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
 pub(super) struct Body {
     scene: Scene,
     engine: Engine,
-    /// Places of particles led by hand, and in how many more steps they are led there.
-    led: BTreeMap<usize, ([f64; 2], u8)>,
     /// Of the solve that put the body to rest, if it has not moved since.
     residual: Option<f64>,
+    /// Whether the update is one for a body that a solver puts to rest.
+    is_to_be_stepped: bool,
 }
 
 impl Body {
     /// The body of a scene as an engine has it.
     pub(super) fn at(scene: Scene, engine: Engine, residual: Option<f64>) -> Self {
-        Self { scene, engine, led: BTreeMap::new(), residual }
+        let is_to_be_stepped = scene.equilibrium.is_some();
+        Self { scene, engine, residual, is_to_be_stepped }
+    }
+
+    /// Takes the update of a body that is stepped.
+    fn suit_steps(&mut self) {
+        if std::mem::take(&mut self.is_to_be_stepped) {
+            let (body, flock) = (self.engine.body(), self.engine.flock());
+            let update = update_of_steps(&self.scene, body, &flock.neighbours, &flock.weights, None);
+            self.engine.set_damping(update.damping);
+        }
     }
 
     pub(super) fn count(&self) -> usize {
@@ -57,14 +67,9 @@ impl Body {
     fn go(&mut self, end: usize) -> Option<Divergence> {
         let begun = Instant::now();
         while self.engine.step() < end && begun.elapsed() < BETWEEN_LOOKS {
-            if self.led.is_empty() {
-                match self.engine.steps_at_once(end - self.engine.step()) {
-                    0 => self.engine.advance(),
-                    count => drop(self.engine.advance_by(count, None)),
-                }
-            } else {
-                self.lead_on();
-                self.engine.advance();
+            match self.engine.steps_at_once(end - self.engine.step()) {
+                0 => self.engine.advance(),
+                count => drop(self.engine.advance_by(count, None)),
             }
             // After every batch, so that the step of it does not depend on the clock.
             let divergence = overflow(&self.engine);
@@ -73,23 +78,6 @@ impl Body {
             }
         }
         None
-    }
-
-    /// Leads by hand in the next step.
-    fn lead_on(&mut self) {
-        let Self { engine, led, .. } = self;
-        led.iter().for_each(|(&particle, &(place, _))| engine.lead(particle, place));
-        led.retain(|_, (_, more)| {
-            *more -= 1;
-            *more > 0
-        });
-    }
-
-    /// The next place of a particle that does not follow. One that nothing else moves must be put there twice, as the
-    /// engine steps between two sets of places.
-    fn lead_to(&mut self, particle: usize, place: [f64; 2]) {
-        let more = if self.engine.roles()[particle] == Role::Leader { 1 } else { 2 };
-        self.led.insert(particle, (place, more));
     }
 
     fn require_led(&self, particle: usize) -> PyResult<()> {
@@ -183,7 +171,11 @@ impl Body {
         let threads = Threads::taken()?;
         self.residual = None;
         while self.engine.step() < end {
-            if let Some(divergence) = py.detach(|| threads.install(|| self.go(end))) {
+            let mut go = || {
+                self.suit_steps();
+                self.go(end)
+            };
+            if let Some(divergence) = py.detach(|| threads.install(&mut go)) {
                 return Err(diverged(&divergence));
             }
             py.check_signals()?;
@@ -197,7 +189,7 @@ impl Body {
     fn lead(&mut self, particles: &Bound<'_, PyAny>, places: &Bound<'_, PyAny>) -> PyResult<()> {
         let led = placed(Some(particles), places, self.count())?;
         led.iter().try_for_each(|&(particle, _)| self.require_led(particle))?;
-        led.into_iter().for_each(|(particle, place)| self.lead_to(particle, place));
+        led.into_iter().for_each(|(particle, place)| self.engine.lead(particle, place));
         Ok(())
     }
 
@@ -206,12 +198,8 @@ impl Body {
     /// places [length], shape (k, 2) for k particles, or (count, 2) for all of them.
     #[pyo3(signature = (places, particles=None))]
     fn observe(&mut self, places: &Bound<'_, PyAny>, particles: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
-        let mut seen = placed(particles, places, self.count())?;
-        self.engine.observe(seen.iter().copied());
+        self.engine.observe(placed(particles, places, self.count())?);
         self.residual = None;
-        // What does not move by itself stays where it was seen.
-        seen.retain(|&(i, _)| matches!(self.engine.roles()[i], Role::Clamped | Role::Ghost));
-        seen.into_iter().for_each(|(particle, place)| self.lead_to(particle, place));
         Ok(())
     }
 
@@ -236,9 +224,7 @@ impl Body {
         if let StopReason::Diverged(divergence) = &reason {
             return Err(diverged(divergence));
         }
-        self.engine = engine;
-        self.residual = Some(residual);
-        self.led.clear();
+        *self = Self::at(self.scene.clone(), engine, Some(residual));
         let way = PyDict::new(py);
         way.set_item("reason", reason.name())?;
         way.set_item("words", words(&reason))?;
@@ -253,8 +239,8 @@ impl Body {
         Self {
             scene: self.scene.clone(),
             engine: self.engine.clone(),
-            led: self.led.clone(),
             residual: self.residual,
+            is_to_be_stepped: self.is_to_be_stepped,
         }
     }
 

@@ -34,6 +34,14 @@ def test_a_led_particle_stays_where_it_was_led(held_sheet):
     assert body.positions()[right[0]].tolist() == [20.0, 20.0]
 
 
+def test_a_body_whose_scene_asks_for_equilibrium_is_stepped_as_well():
+    body = flockform.Body("bar")
+    for begin in (lambda: None, body.solve):
+        begin()
+        body.advance(300)
+        assert np.abs(body.displacements()).max() < 0.11
+
+
 def test_a_body_seen_where_it_was_sent_goes_on_as_if_it_were_not(held_sheet):
     body, other = flockform.Body(held_sheet), flockform.Body(held_sheet)
     for one in (body, other):

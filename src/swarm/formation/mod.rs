@@ -315,7 +315,7 @@ impl Formation {
     /// Sets the part of the way to each target that a follower goes from the next period on \[1\].
     pub fn set_damping(&mut self, damping: f64) {
         if let TargetSource::Rule { engine, .. } = &mut self.course {
-            engine.set_rule(engine.flock().rule, damping);
+            engine.set_damping(damping);
         }
     }
 
