@@ -39,7 +39,8 @@ def test_a_body_whose_scene_asks_for_equilibrium_is_stepped_as_well():
     for begin in (lambda: None, body.solve):
         begin()
         body.advance(300)
-        assert np.abs(body.displacements()).max() < 0.11
+        # In the elongation of its load, not beyond it.
+        assert np.abs(body.displacements()).max() < 0.4 + 1e-9
 
 
 def test_a_body_seen_where_it_was_sent_goes_on_as_if_it_were_not(held_sheet):
