@@ -10,7 +10,8 @@ use std::time::Instant;
 use clap::Args;
 use flockform::export::shell::quoted;
 use flockform::export::sweep::{
-    Journal, JournalHeader, Output, Row, StoredSweep, SweepError, SweepRequest, Table, read, write_sweep,
+    Journal, JournalHeader, Output, Row, StoredSweep, SweepError, SweepRequest, Table, gather, read,
+    write_sweep,
 };
 use flockform::export::{ExportError, OutputFolder, unfinished};
 use flockform::scene::Scene;
@@ -131,7 +132,7 @@ struct Sweep {
 
 impl Sweep {
     /// Lays out what is asked for; the usual outputs where none are named.
-    fn new(mut request: SweepRequest, rows: Vec<Row>) -> Result<Self, Refusal> {
+    fn new(mut request: SweepRequest, rows: BTreeMap<usize, Row>) -> Result<Self, Refusal> {
         let scene = scene_arguments(&request).load([])?;
         if request.outputs.is_empty() {
             request.outputs = Output::usual(&scene);
@@ -143,9 +144,7 @@ impl Sweep {
         };
         let design = request.design(is_whole)?;
         require_columns(&design, &request.outputs)?;
-        let rows = rows.into_iter().map(|row| (row.run, row)).collect();
-        let plan_digest = runs::first_digest(&arguments, &design);
-        Ok(Self { begun: JournalHeader::new(request, &scene, plan_digest), scene, design, rows })
+        Ok(Self { begun: JournalHeader::new(request, &scene), scene, design, rows })
     }
 
     fn request(&self) -> &SweepRequest {
@@ -204,7 +203,7 @@ impl Sweep {
             let all = counted(self.rows.len(), "run");
             note!("caution: {cautioned} of {all} with cautions of their own: see the column `cautions`");
         }
-        let is_refused = self.rows.values().any(|row| row.stop_reason == runs::REFUSED);
+        let is_refused = self.rows.values().any(Row::is_refused);
         Ok(exit_code(!is_refused))
     }
 
@@ -288,9 +287,12 @@ fn sweep_here(arguments: &SweepArguments) -> Result<ExitCode, Refusal> {
             let mut request = found.begun.request.clone();
             // The place is taken by the runs that are gone on with, and will be when this is gone on with in turn.
             request.force |= found.folder == found.out;
-            (request, found.rows.clone())
+            let mut rows = gather(std::slice::from_ref(found))?;
+            // What was in the way of a run may be gone.
+            rows.retain(|_, row| !row.is_refused());
+            (request, rows)
         }
-        None => (arguments.request()?, Vec::new()),
+        None => (arguments.request()?, BTreeMap::new()),
     };
     let mut sweep = Sweep::new(request, rows)?;
     found.as_ref().map_or(Ok(()), |found| found.begun.require_same(&found.folder, &sweep.begun))?;
@@ -362,9 +364,9 @@ fn merge(arguments: &SweepArguments, start: Instant) -> Result<ExitCode, Refusal
     let Some((one, others)) = parts.split_first() else { return Ok(ExitCode::SUCCESS) };
     let whole = one.begun.whole();
     if let Some(other) = others.iter().find(|other| other.begun.whole() != whole) {
-        return Err(SweepError::apart(&one.folder, &other.folder).into());
+        return Err(SweepError::apart(&one.folder, &other.folder, "they were asked for otherwise").into());
     }
-    let rows = parts.iter().flat_map(|part| part.rows.clone()).collect();
+    let rows = gather(&parts)?;
     let mut request = whole.request;
     request.force = arguments.output.force;
     let sweep = Sweep::new(request, rows)?;

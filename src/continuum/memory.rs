@@ -8,9 +8,10 @@ use super::equilibrium::is_nearly_incompressible;
 use super::plan::Plan;
 use crate::engine::setup::Setup;
 use crate::flock::body::Cut;
+use crate::flock::lattice::Site;
 use crate::flock::law::Weights;
 use crate::flock::neighbourhood::Neighbourhood;
-use crate::flock::outlay::MOST_SITES;
+use crate::flock::outlay::{MOST_ENTRIES, MOST_SITES};
 use crate::flock::role::Role;
 use crate::flock::rules::Mean;
 use crate::geometry::outline::{Outline, Place};
@@ -33,19 +34,34 @@ pub fn field(text: &str, name: &str) -> Option<u64> {
 
 /// Fewest bytes that a run of a scene takes, known before anything is laid out; 0 where its layout is refused anyway.
 pub fn at_least(scene: &Scene) -> f64 {
-    let particles = match &scene.body {
+    let (particles, extent) = match &scene.body {
         BodySource::Points(cloud) => {
             // The lists, and what finds them anew or sweeps over them; means that are not affine are swept over as they are.
             let is_within = matches!(scene.neighbourhood, Neighbourhood::Within { .. });
             let entry = if is_within && scene.mean != Mean::Barycentre { 4.0 } else { 8.0 };
             return (cloud.ids.len() * EACH) as f64 + entry * cloud.entries as f64;
         }
-        BodySource::Cut(Cut::Count { columns, rows }) => f64::from(*columns) * f64::from(*rows),
+        BodySource::Cut(Cut::Count { columns, rows }) => {
+            let extent = [columns, rows].map(|&count| f64::from(count));
+            (extent[0] * extent[1], extent)
+        }
         BodySource::Cut(Cut::Shape(shape)) => {
-            Outline::of_shape(shape).map_or(0.0, |outline| outline.area() / scene.lattice.cell_area())
+            let cells = |outline: Outline| outline.area() / scene.lattice.cell_area();
+            let (low, high) = scene.lattice.grid_bounds(shape.bounds());
+            (Outline::of_shape(shape).map_or(0.0, cells), [high[0] - low[0], high[1] - low[1]])
         }
     };
-    if particles > MOST_SITES as f64 { 0.0 } else { particles * EACH as f64 }
+    let entries = particles * seen(scene, extent);
+    let is_refused = particles > MOST_SITES as f64 || entries > MOST_ENTRIES as f64;
+    if is_refused { 0.0 } else { particles * EACH as f64 + 4.0 * entries }
+}
+
+/// Others that a particle of a body of so many columns and rows sees on average, at least; at its edge they are fewer.
+fn seen(scene: &Scene, extent: [f64; 2]) -> f64 {
+    let inside = |far: i32, extent: f64| (1.0 - f64::from(far.abs()) / extent).max(0.0);
+    let share = |offset: &Site| inside(offset[0], extent[0]) * inside(offset[1], extent[1]);
+    let lists = scene.neighbourhood.offsets(&scene.lattice).unwrap_or_default();
+    lists.iter().map(|list| list.iter().map(share).sum()).reduce(f64::min).unwrap_or(0.0)
 }
 
 /// Bytes of each particle: positions (twice), reference, roles, sites, and where its neighbours begin.

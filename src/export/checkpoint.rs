@@ -33,7 +33,7 @@ pub use self::error::CheckpointError;
 use self::error::RESTORE;
 use super::Records;
 use super::error::ExportError;
-use super::manifest::create;
+use super::manifest::{create, read_regular};
 use super::parts::write_each;
 use super::report::AnimationState;
 use crate::continuum::digest::fnv1a;
@@ -244,7 +244,7 @@ impl Checkpoint<'static> {
     /// One that cannot be read, is not whole, or was written by another version.
     pub fn read(folder: &Path) -> Result<Option<Self>, CheckpointError> {
         let path = folder.join(FILE);
-        match fs::read(&path) {
+        match read_regular(&path) {
             Ok(bytes) => Self::of_bytes(&path, &bytes).map(Some),
             Err(source) if source.kind() == ErrorKind::NotFound => Ok(None),
             Err(source) => Err(CheckpointError::Unreadable { path, source }),
@@ -269,7 +269,7 @@ impl Checkpoint<'static> {
                 continue;
             }
             let path = folder.join(file);
-            let bytes = fs::read(&path)
+            let bytes = read_regular(&path)
                 .map_err(|source| CheckpointError::Unreadable { path: path.clone(), source })?;
             let piece = Self::of_bytes(&path, &bytes)?;
             if (piece.engine.step(), piece.engine.count()) != (self.engine.step(), count) {

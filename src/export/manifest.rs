@@ -88,7 +88,23 @@ pub(crate) fn create(path: &Path) -> io::Result<File> {
     }
 }
 
-/// The same, buffered.
+/// Refuses a link, which may lead to a file that is not flockform's, and a pipe, which may never end.
+pub(super) fn require_regular(path: &Path) -> io::Result<()> {
+    match path.symlink_metadata()?.is_file() {
+        true => Ok(()),
+        false => Err(io::Error::other("it is no regular file")),
+    }
+}
+
+/// The contents of a file that flockform wrote.
+///
+/// # Errors
+/// Those of the system, and what is no regular file.
+pub(super) fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
+    require_regular(path).and_then(|()| fs::read(path))
+}
+
+/// The same as [`create`], buffered.
 pub(crate) fn create_buffered(path: &Path) -> io::Result<BufWriter<File>> {
     create(path).map(BufWriter::new)
 }

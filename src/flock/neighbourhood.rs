@@ -196,7 +196,18 @@ pub struct Neighbours {
 impl Neighbours {
     /// One list for each particle, in the order of the particles.
     pub fn from_lists(lists: impl IntoIterator<Item = impl IntoIterator<Item = u32>>) -> Self {
-        let mut neighbours = Self { starts: vec![0], index: Vec::new() };
+        Self::from_lists_of(0, lists)
+    }
+
+    /// The same with room for so many entries: a list that grows takes twice as much at its last step.
+    pub(crate) fn from_lists_of(
+        entries: usize,
+        lists: impl IntoIterator<Item = impl IntoIterator<Item = u32>>,
+    ) -> Self {
+        let lists = lists.into_iter();
+        let mut starts = Vec::with_capacity(1 + lists.size_hint().0);
+        starts.push(0);
+        let mut neighbours = Self { starts, index: Vec::with_capacity(entries) };
         for list in lists {
             neighbours.index.extend(list);
             neighbours.starts.push(neighbours.index.len() as u32);

@@ -153,10 +153,11 @@ impl Outlay<'_> {
             return Err(BodyError::ManyNeighbours { about, limit: MOST_ENTRIES });
         }
         let map = &map;
-        let neighbours = Neighbours::from_lists(sites.iter().zip(&is_frame).map(|(&site, &is_frame)| {
+        let lists = sites.iter().zip(&is_frame).map(|(&site, &is_frame)| {
             let offsets: &[Site] = if is_frame { &[] } else { &offsets[lattice.sublattice(site)] };
             offsets.iter().filter_map(move |offset| map.index([site[0] + offset[0], site[1] + offset[1]]))
-        }));
+        });
+        let neighbours = Neighbours::from_lists_of(about as usize, lists);
         let frame = frame.map(|rule| Frame::build(rule, lattice, &sites, &is_frame, |site| map.index(site)));
         let lattice = lattice.clone();
         let body =
@@ -281,7 +282,8 @@ impl SiteMap {
 
     /// Numbers what was marked, column by column from the bottom.
     fn number(&mut self) -> (Vec<Site>, Vec<bool>) {
-        let (mut sites, mut is_frame) = (Vec::new(), Vec::new());
+        let count = self.cells.iter().filter(|&&mark| mark != NOTHING).count();
+        let (mut sites, mut is_frame) = (Vec::with_capacity(count), Vec::with_capacity(count));
         for cell in 0..self.cells.len() {
             let mark = self.cells[cell];
             if mark != NOTHING {

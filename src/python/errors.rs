@@ -38,7 +38,7 @@ impl From<scene::SceneError> for PyErr {
 fn described<'py>(py: Python<'py>, problem: &Problem) -> PyResult<Bound<'py, PyDict>> {
     let line = match problem.place {
         Place::Line { line, .. } => Some(line),
-        Place::File { .. } | Place::Override { .. } => None,
+        Place::File { .. } | Place::Override { .. } | Place::Varied { .. } => None,
     };
     let description = PyDict::new(py);
     description.set_item("place", problem.place.to_string())?;

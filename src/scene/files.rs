@@ -10,11 +10,21 @@ use super::swarm::raw::{RawProgram, RawSwarm};
 impl RawScene {
     /// Names the files that are looked up in the folder `from` as they are found from the folder `to`.
     pub(crate) fn name_files_from(&mut self, from: Option<&Path>, to: &Path) {
+        name_from(from, to, self.files_mut());
+    }
+
+    /// The files that it names, as they are found from where the program stands, when they are looked up in `folder`.
+    pub fn files(&self, folder: Option<&Path>) -> Vec<PathBuf> {
+        let folder = folder.unwrap_or(Path::new(""));
+        self.clone().files_mut().map(|file| folder.join(file)).collect()
+    }
+
+    fn files_mut(&mut self) -> impl Iterator<Item = &mut String> {
         let motions = self.roles.iter_mut().filter_map(|entry| match &mut entry.motion {
             Some(RawMotion::Csv { file, .. }) => Some(file),
             _ => None,
         });
-        name_from(from, to, motions.chain(file_of(&mut self.body.shape)));
+        motions.chain(file_of(&mut self.body.shape))
     }
 }
 

@@ -64,7 +64,13 @@ pub(crate) fn read(path: &Path) -> Result<String> {
 /// As [`read`].
 pub(super) fn read_at_most(path: &Path, most: u64) -> Result<String> {
     let mut bytes = Vec::new();
-    let length = File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
+    let opened = File::open(path).map_err(|error| match error.kind() {
+        ErrorKind::NotFound if path.is_symlink() => {
+            Error::new(ErrorKind::NotFound, "it is a link to a file that is not there")
+        }
+        _ => error,
+    });
+    let length = opened?.take(most + 1).read_to_end(&mut bytes)?;
     if length as u64 > most {
         return Err(Error::new(ErrorKind::FileTooLarge, format!("longer than {} MiB", most >> 20)));
     }
@@ -75,9 +81,9 @@ pub(super) fn read_at_most(path: &Path, most: u64) -> Result<String> {
     })
 }
 
-/// Whether a word is a path rather than a name: one that is there, or looks like one.
+/// Whether a word is a path rather than a name: one that is there, if only as a link to nothing, or looks like one.
 pub fn is_path(word: &str) -> bool {
-    Path::new(word).exists() || word.contains(['/', '\\', '.'])
+    Path::new(word).symlink_metadata().is_ok() || word.contains(['/', '\\', '.'])
 }
 
 /// Keys, choices and bundled files that had another name once, with the one they have now.

@@ -294,6 +294,29 @@ fn a_run_that_still_runs_is_not_resumed_by_another() {
     kill(child);
 }
 
+#[cfg(unix)]
+#[test]
+fn a_checkpoint_that_is_a_pipe_or_a_link_is_refused() {
+    let folder = temporary();
+    std::fs::create_dir(folder.path().join("o.unfinished")).expect("writable");
+    let checkpoint = folder.path().join("o.unfinished/checkpoint");
+    let refused_soon = || {
+        let mut child = start(&["run", "--resume", "o"], folder.path());
+        let since = Instant::now();
+        while child.try_wait().expect("a child").is_none() && since.elapsed() < Duration::from_secs(20) {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        // One that waits for what never comes ends without a code.
+        child.kill().expect("kills");
+        child.wait().expect("ends").code() == Some(2)
+    };
+    let made = std::process::Command::new("mkfifo").arg(&checkpoint).status().expect("starts");
+    assert!(made.success() && refused_soon());
+    std::fs::remove_file(&checkpoint).expect("removable");
+    std::os::unix::fs::symlink("nowhere", &checkpoint).expect("linked");
+    refused_in(&["run", "--resume", "o"], folder.path(), &["checkpoint", "no regular file"]);
+}
+
 #[test]
 fn nothing_to_resume_is_said_and_what_a_checkpoint_says_is_not_said_again() {
     let folder = temporary();

@@ -113,12 +113,20 @@ fn a_body_beyond_the_memory_that_is_there_is_refused_with_both_numbers() {
         let body = format!("body.shape={{kind=\"grid\",columns={columns},rows={columns}}}");
         limited("-v 3000000", &format!("{words} tension --set '{body}'"), folder.path())
     };
-    // 63 bytes a particle are 6.3 and 3.1 GB; that is known before any of it is asked for.
+    // At least 63 bytes a particle are 6.3 and 3.1 GB; that is known before any of it is asked for.
     for columns in ["10000", "7000"] {
         for words in ["run --out o", "plan"] {
             let words_of_both = ["GiB of memory or more", "`ulimit -v`", "help: "];
             assert_refused(&limited(columns, words), columns, &words_of_both);
         }
+    }
+    // With their lists, 79 bytes each, 0.71 GB: beside the program that is too much, or just enough.
+    let body = "body.shape={kind=\"grid\",columns=3000,rows=3000}";
+    for limit in ["-v 800000", "-v 900000", "-v 1000000"] {
+        let output = self::limited(limit, &format!("run tension --out o --set '{body}'"), folder.path());
+        let said = text(&output.stderr);
+        assert!(output.status.code().is_some(), "{limit}: {said}");
+        assert!(output.status.success() || said.contains("`ulimit -v`"), "{limit}: {said}");
     }
     assert!(names_in(folder.path()).is_empty());
     let small = limited("20", "plan");
@@ -141,6 +149,17 @@ fn points_whose_lists_are_beyond_the_memory_that_is_there_are_refused_as_a_body_
         assert_refused(&output, words, &["GiB of memory or more", "`ulimit -v`"]);
     }
     assert_eq!(names_in(folder.path()), ["heap.csv", "heap.toml"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_scene_that_is_a_link_to_nothing_or_to_itself_is_refused_as_such() {
+    let folder = temporary();
+    for (to, words) in [("nowhere", "a link to a file that is not there"), ("scene", "symbolic links")] {
+        let _ = std::fs::remove_file(folder.path().join("scene"));
+        std::os::unix::fs::symlink(to, folder.path().join("scene")).expect("linked");
+        refused_in(&["run", "scene"], folder.path(), &[words, "help: "]);
+    }
 }
 
 #[cfg(unix)]

@@ -16,6 +16,7 @@ mod faults;
 mod folders;
 mod install;
 mod interrupt;
+mod journal;
 #[path = "../common/json.rs"]
 mod json;
 mod load_steps;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use crate::program::*;
 
 /// The cells of a table, its head first.
-fn table(path: impl AsRef<Path>) -> Vec<Vec<String>> {
+pub fn table(path: impl AsRef<Path>) -> Vec<Vec<String>> {
     let mut reader = csv::ReaderBuilder::new().has_headers(false).from_path(path).expect("a table");
     let cells = |row: csv::StringRecord| row.iter().map(str::to_owned).collect();
     reader.records().map(|row| cells(row.expect("a row"))).collect()
@@ -165,6 +165,10 @@ fn what_cannot_be_swept_is_refused_and_leaves_nothing() {
     sweep(&["--vary", "update.damping=0.5:1"], &["--samples"]);
     sweep(&["--vary", "a=0:1:2000", "--vary", "b=0:1:2000"], &["more than 1000000 runs"]);
     sweep(&[&damping[..], &damping].concat(), &["twice"]);
+    let part = ["--vary", "update=[{damping=0.5},{damping=0.9}]"];
+    sweep(&[&damping[..], &part].concat(), &["twice", "--vary update.damping", "--vary update\n", "help: "]);
+    sweep(&[&part[..], &["--vary", "update . \"damping\"=[1]"]].concat(), &["twice"]);
+    sweep(&["--vary", "update.damping=[nan, -1]"], &["--vary update.damping=nan: "]);
     sweep(&[&damping[..], &["--outputs", "energies.pe9"]].concat(), &["energies.pe9", "pe1, pe2"]);
     sweep(&[&damping[..], &["--outputs", "energies"]].concat(), &["energies.pe1"]);
     sweep(&[&damping[..], &["--outputs", "probe.999999.x"]].concat(), &["no particle 999999"]);
@@ -304,102 +308,4 @@ fn runs_of_a_scene_that_has_changed_are_not_gone_on_with() {
     std::fs::write(&path, read(&path).replace("steps = 401", "steps = 40")).expect("writable");
     refused_in(&["sweep", "--resume", "o"], folder.path(), &["are of another"]);
     assert_eq!(table(folder.path().join("o/sweep.csv")).len(), 3);
-}
-
-/// A scene whose body is in a file beside it.
-const POINTS: &str = r#"
-title = "Four by three"
-neighbours = { kind = "within", radius = 1.2 }
-stop = { steps = 5 }
-body = { shape = { kind = "points", file = "points.csv" } }
-
-[[roles]]
-region = { kind = "edge", side = "left", depth = 0.5 }
-role = "clamped"
-
-[[roles]]
-region = { kind = "edge", side = "right", depth = 0.5 }
-role = "leader"
-motion = { kind = "velocity", per_step = [0.05, 0.0] }
-"#;
-
-fn points(last_x: f64) -> String {
-    let places = (0..12).map(|n| (if n == 11 { last_x } else { f64::from(n / 3) }, f64::from(n % 3)));
-    std::iter::once("x,y\n".to_owned()).chain(places.map(|(x, y)| format!("{x:?},{y:?}\n"))).collect()
-}
-
-#[test]
-fn runs_of_a_body_whose_points_have_changed_are_not_put_together() {
-    let folder = temporary();
-    let place = folder.path().join("points.csv");
-    std::fs::write(folder.path().join("mine.toml"), POINTS).expect("writable");
-    let shard = |part: &str, out: &str| {
-        let arguments = ["sweep", "mine.toml", "--vary", "update.damping=0.5:1:4", "--figures", "none", "-q"];
-        done(&[&arguments[..], &["--shard", part, "--out", out]].concat(), folder.path());
-    };
-    std::fs::write(&place, points(3.0)).expect("writable");
-    shard("1/2", "a");
-    shard("2/2", "b");
-    done(&["sweep", "--merge", "a", "b", "--out", "both", "--figures", "none", "-q"], folder.path());
-    std::fs::write(&place, points(3.1)).expect("writable");
-    shard("2/2", "c");
-    refused_in(&["sweep", "--merge", "a", "c", "--out", "none"], folder.path(), &["not parts of one sweep"]);
-    refused_in(&["sweep", "--resume", "a"], folder.path(), &["of another body"]);
-}
-
-/// A finished sweep of two runs in `o`.
-fn finished(folder: &Path) {
-    let arguments = ["sweep", "tension", "--vary", "update.damping=0.5:1:2", "--set", "stop.steps=2", "-q"];
-    done(&[&arguments[..], &["--out", "o", "--figures", "none"]].concat(), folder);
-}
-
-fn not_resumed(folder: &Path, words: &[&str]) {
-    refused_in(&["sweep", "--resume", "o"], folder, words);
-}
-
-#[test]
-fn files_of_a_sweep_that_cannot_be_trusted_are_named() {
-    let folder = temporary();
-    finished(folder.path());
-    let [rows, request] = ["runs.jsonl", "sweep.json"].map(|name| folder.path().join("o").join(name));
-    let (good_rows, good_request) = (read(&rows), read(&request));
-    std::fs::write(&rows, format!("damaged\n{good_rows}")).expect("writable");
-    not_resumed(folder.path(), &["runs.jsonl", "line 1"]);
-    std::fs::write(&rows, &good_rows).expect("writable");
-    let written: serde_json::Value = serde_json::from_str(&good_request).expect("JSON");
-    let with = |key: &str, value: serde_json::Value| {
-        let mut changed = written.clone();
-        changed["request"][key] = value;
-        std::fs::write(&request, changed.to_string()).expect("writable");
-    };
-    with("shard", serde_json::json!({ "number": 1, "of": 0 }));
-    not_resumed(folder.path(), &["sweep.json", "--shard 1/0"]);
-    with("vary", serde_json::json!(["update.damping"]));
-    not_resumed(folder.path(), &["sweep.json", "there is no `=`"]);
-    with("outputs", serde_json::json!([]));
-    not_resumed(folder.path(), &["not those of its sweep.json"]);
-}
-
-#[cfg(unix)]
-#[test]
-fn a_resumed_sweep_neither_follows_links_nor_discards_what_else_was_begun() {
-    let folder = temporary();
-    finished(folder.path());
-    let (rows, other) = (folder.path().join("o/runs.jsonl"), folder.path().join("other"));
-    std::fs::rename(&rows, &other).expect("movable");
-    let kept = read(&other);
-    std::os::unix::fs::symlink(&other, &rows).expect("linked");
-    // In the open, as a kill leaves it.
-    std::fs::rename(folder.path().join("o"), folder.path().join("o.unfinished")).expect("movable");
-    not_resumed(folder.path(), &["runs.jsonl", "no regular file"]);
-    assert_eq!(read(&other), kept);
-    std::fs::remove_file(folder.path().join("o.unfinished/runs.jsonl")).expect("removable");
-    std::fs::rename(&other, folder.path().join("o.unfinished/runs.jsonl")).expect("movable");
-    std::fs::rename(folder.path().join("o.unfinished"), folder.path().join("real")).expect("movable");
-    std::os::unix::fs::symlink(folder.path().join("real"), folder.path().join("o")).expect("linked");
-    let begun = folder.path().join("real.unfinished/checkpoint");
-    std::fs::create_dir(folder.path().join("real.unfinished")).expect("writable");
-    std::fs::write(&begun, "a run").expect("writable");
-    not_resumed(folder.path(), &["real.unfinished", "not finished"]);
-    assert_eq!(read(&begun), "a run");
 }

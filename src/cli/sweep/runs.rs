@@ -1,44 +1,30 @@
 //! The runs of a sweep, made in parallel, each on a thread of its own.
 
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::thread::Builder;
 use std::time::Instant;
 
-use flockform::continuum::digest::digest;
 use flockform::continuum::equilibrium::run_to_equilibrium_watched;
 use flockform::continuum::run::StopReason;
 use flockform::engine::Engine;
 use flockform::engine::observer::Observer;
-use flockform::export::sweep::{Journal, Output, Probed, Row, SweepError, Values};
+use flockform::export::sweep::{Journal, Output, Probed, Row, SweepError, Values, checksums};
 use flockform::export::{ExportError, Measured, Summary, Timings};
 use flockform::scene::{Scene, SceneError};
 use flockform::study::compare::run::plan;
 use flockform::study::design::Design;
 use flockform::study::trade::choose;
 
-use super::super::names::SceneArguments;
+use super::super::names::{SceneArguments, folder_of};
 use super::super::progress::Progress;
 use super::super::run::interruptible;
 use super::super::{Refusal, interrupt};
 
-/// How a run ended that could not begin.
-pub const REFUSED: &str = "refused";
-
 /// Updates of particles between two looks at the interrupt, at most: about a tenth of a second.
 const UPDATES_BETWEEN_LOOKS: usize = 1 << 23;
-
-/// Runs in which one is looked for that can be laid out.
-const MOST_LAID_OUT: usize = 16;
-
-/// Digest of the plan of the first run that can be laid out: of two sweeps of one command line it distinguishes those
-/// whose point or motion files differ.
-pub fn first_digest(scene: &SceneArguments, design: &Design) -> Option<u64> {
-    let runs = 0..design.runs.len().min(MOST_LAID_OUT);
-    let laid_out = |run| plan(&scene.load_scene(&design.overrides(run)).ok()?).ok();
-    runs.into_iter().find_map(laid_out).map(|plan| digest(&plan))
-}
 
 /// The runs of a design.
 pub struct Runs<'a> {
@@ -52,6 +38,7 @@ struct Ended {
     stop_reason: StopReason,
     outputs: Vec<Result<String, SweepError>>,
     cautions: Vec<String>,
+    files: BTreeMap<String, Option<u32>>,
 }
 
 impl Ended {
@@ -157,10 +144,15 @@ impl Runs<'_> {
 
     /// The end and the outputs of a run, as `flockform run` makes it.
     fn ended(&self, run: usize) -> Result<Ended, SceneError> {
-        let start = Instant::now();
         let overrides = self.design.overrides(run);
-        let load = |more: &[String]| self.scene.load_scene(&[&overrides, more].concat());
+        self.ended_with(&overrides).map_err(|error| error.varied_by(&overrides))
+    }
+
+    fn ended_with(&self, overrides: &[String]) -> Result<Ended, SceneError> {
+        let start = Instant::now();
+        let load = |more: &[String]| self.scene.load_scene(&[overrides, more].concat());
         let scene = interruptible(choose(load(&[])?, &load)?.scene);
+        let files = checksums(&scene.raw.files(folder_of(&self.scene.scene).as_deref()));
         let plan = plan(&scene)?;
         let between = (UPDATES_BETWEEN_LOOKS / plan.count().max(1)).max(1);
         let mut observer = Look { outputs: self.outputs, probed: Probed::default(), between };
@@ -171,29 +163,36 @@ impl Runs<'_> {
         let summary = Summary::new(&scene, &outcome, measured, timings);
         let values = Values { engine: &outcome.engine, summary: &summary, probed: &observer.probed };
         let outputs = values.texts(self.outputs);
-        Ok(Ended { outputs, stop_reason: outcome.reason, cautions: summary.cautions })
+        Ok(Ended { outputs, stop_reason: outcome.reason, cautions: summary.cautions, files })
     }
 
     /// The row of a run; none for one that was broken off.
     fn row(&self, run: usize, ended: Result<Ended, SceneError>) -> Option<Row> {
-        let row = |stop_reason: &str, outputs: Vec<String>, reason: String, cautions: Vec<String>| {
-            Some(Row { run, stop_reason: stop_reason.to_owned(), outputs, reason, cautions })
-        };
         match ended {
             Ok(Ended { stop_reason: StopReason::Interrupted, .. }) => None,
-            Ok(Ended { stop_reason, outputs, mut cautions }) => {
+            Ok(Ended { stop_reason, outputs, mut cautions, files }) => {
                 let missing =
                     outputs.iter().filter_map(|output| output.as_ref().err()).map(SweepError::to_string);
                 cautions.extend(missing.map(|error| error.lines().next().unwrap_or_default().to_owned()));
                 let outputs = outputs.into_iter().map(Result::unwrap_or_default).collect();
-                row(stop_reason.name(), outputs, stop_reason.fault().unwrap_or_default(), cautions)
+                let reason = stop_reason.fault().unwrap_or_default();
+                Some(Row {
+                    run,
+                    stop_reason: stop_reason.name().to_owned(),
+                    outputs,
+                    reason,
+                    cautions,
+                    files,
+                })
             }
             // A solve that was broken off has an error as well.
             Err(_) if interrupt::is_raised() => None,
             Err(error) => {
                 let words = error.to_string();
                 let reason = words.lines().next().unwrap_or_default().to_owned();
-                row(REFUSED, vec![String::new(); self.outputs.len()], reason, Vec::new())
+                let outputs = vec![String::new(); self.outputs.len()];
+                let (stop_reason, cautions, files) = (Row::REFUSED.to_owned(), Vec::new(), BTreeMap::new());
+                Some(Row { run, stop_reason, outputs, reason, cautions, files })
             }
         }
     }

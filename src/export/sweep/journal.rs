@@ -1,14 +1,17 @@
 //! The journal of a sweep: what was asked for, and every run that has ended.
 
+use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::super::error::{ExportError, write_file};
+use super::super::manifest::{read_regular, require_regular};
 use super::super::{OutputFolder, out_of, summary, unfinished};
 use crate::scene::Scene;
 use crate::study::design::{Design, DesignError, Factor, Sampling, Shard};
@@ -64,18 +67,15 @@ pub struct JournalHeader {
     version: String,
     /// Of the scene without the variations, as text.
     scene_crc32: u32,
-    /// Digest of the plan of the first run that can be laid out, which depends on the files that the scene names.
-    plan_digest: Option<u64>,
     /// The command line.
     pub request: SweepRequest,
 }
 
 impl JournalHeader {
-    /// A sweep of this scene, which is the one without the variations; `plan_digest` is of the first run that can be
-    /// laid out.
-    pub fn new(request: SweepRequest, scene: &Scene, plan_digest: Option<u64>) -> Self {
+    /// A sweep of this scene, which is the one without the variations.
+    pub fn new(request: SweepRequest, scene: &Scene) -> Self {
         let (program, version) = (summary::PROGRAM.to_owned(), summary::VERSION.to_owned());
-        Self { program, version, scene_crc32: crc32(scene), plan_digest, request }
+        Self { program, version, scene_crc32: crc32(&scene.raw), request }
     }
 
     /// Refuses to add the runs of `now` where they are of another scene or of another program.
@@ -87,8 +87,6 @@ impl JournalHeader {
             format!("of version {} of the program", self.version)
         } else if self.scene_crc32 != now.scene_crc32 {
             format!("of another `{}`", self.request.scene)
-        } else if self.plan_digest != now.plan_digest {
-            format!("of another body: a file that `{}` names has changed", self.request.scene)
         } else {
             return Ok(());
         };
@@ -101,9 +99,35 @@ impl JournalHeader {
     }
 }
 
-fn crc32(scene: &Scene) -> u32 {
-    // A scene that was read can be written.
-    crc32fast::hash(serde_json::to_string(&scene.raw).unwrap_or_default().as_bytes())
+fn crc32(of: &impl Serialize) -> u32 {
+    // What was read can be written.
+    crc32fast::hash(serde_json::to_string(of).unwrap_or_default().as_bytes())
+}
+
+/// What is written, with a checksum: one bit that changes on the disk may leave another number, which reads as well.
+#[derive(Serialize, Deserialize)]
+struct Summed<T> {
+    crc32: u32,
+    #[serde(flatten)]
+    of: T,
+}
+
+impl<T: Serialize> Summed<T> {
+    fn new(of: T) -> Self {
+        Self { crc32: crc32(&of), of }
+    }
+}
+
+impl<T: Serialize + DeserializeOwned> Summed<T> {
+    /// # Errors
+    /// What is no such text, or another one than was written.
+    fn read(text: &[u8]) -> io::Result<T> {
+        let Self { crc32: written, of } = serde_json::from_slice(text)?;
+        match crc32(&of) == written {
+            true => Ok(of),
+            false => Err(io::Error::other("it is damaged: its checksum differs")),
+        }
+    }
 }
 
 /// A run that has ended.
@@ -118,8 +142,70 @@ pub struct Row {
     /// The cause of a refusal or a divergence.
     pub reason: String,
     /// What its summary cautions against.
-    #[serde(default)]
     pub cautions: Vec<String>,
+    /// Checksum of each file that its scene named, by path; none of a file that could not be read.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub files: BTreeMap<String, Option<u32>>,
+}
+
+impl Row {
+    /// How a run ended that could not begin.
+    pub const REFUSED: &str = "refused";
+
+    /// Whether it could not begin: another time it may.
+    pub fn is_refused(&self) -> bool {
+        self.stop_reason == Self::REFUSED
+    }
+}
+
+/// Checksums of the files of a run, as they are now: see [`Row::files`].
+pub fn checksums(files: &[PathBuf]) -> BTreeMap<String, Option<u32>> {
+    files.iter().map(|file| (file.to_string_lossy().into_owned(), checksum(file))).collect()
+}
+
+fn checksum(file: &Path) -> Option<u32> {
+    // A pipe has been read by now, and has no more.
+    fs::metadata(file).ok().filter(fs::Metadata::is_file)?;
+    Some(crc32fast::hash(&fs::read(file).ok()?))
+}
+
+/// The runs of these sweeps, which are parts of one, by their number; one that ran before one that was refused.
+///
+/// # Errors
+/// Names the folders of two different results of one run, or of runs with different files, and files that are not what
+/// they were.
+pub fn gather(parts: &[StoredSweep]) -> Result<BTreeMap<usize, Row>, SweepError> {
+    let mut rows: BTreeMap<usize, (&Row, &StoredSweep)> = BTreeMap::new();
+    let mut files: BTreeMap<&str, (Option<u32>, &StoredSweep)> = BTreeMap::new();
+    for (part, row) in parts.iter().flat_map(|part| part.rows.iter().map(move |row| (part, row))) {
+        for (file, &sum) in &row.files {
+            let (known, of) = *files.entry(file).or_insert((sum, part));
+            if known != sum {
+                return Err(SweepError::apart(
+                    &of.folder,
+                    &part.folder,
+                    &format!("{file} changed between them"),
+                ));
+            }
+        }
+        match rows.get(&row.run) {
+            Some((known, of)) if !known.is_refused() && !row.is_refused() && *known != row => {
+                let why = format!("they have two results of run {}", row.run);
+                return Err(SweepError::apart(&of.folder, &part.folder, &why));
+            }
+            Some((known, _)) if !known.is_refused() => {}
+            _ => _ = rows.insert(row.run, (row, part)),
+        }
+    }
+    for (file, (sum, part)) in files {
+        if checksum(Path::new(file)) != sum {
+            return Err(SweepError::foreign(
+                &part.folder,
+                &format!("of another body: {file} is not what it was"),
+            ));
+        }
+    }
+    Ok(rows.into_iter().map(|(run, (row, _))| (run, row.clone())).collect())
 }
 
 /// Error in the name of an output, or reading a sweep that has begun: the fault and the remedy.
@@ -139,10 +225,16 @@ impl SweepError {
         Self::new(format!("--outputs {fault}"), help)
     }
 
-    /// Sweeps in two folders that are not parts of one.
-    pub fn apart(one: &Path, other: &Path) -> Self {
-        let fault = format!("{} and {} are not parts of one sweep", one.display(), other.display());
-        Self::new(fault, "merge the shards of one command line, of one version of the program")
+    /// Sweeps in two folders that are not parts of one: `why`, in words.
+    pub fn apart(one: &Path, other: &Path, why: &str) -> Self {
+        if one == other {
+            return Self::foreign(one, &format!("not of one sweep: {why}"));
+        }
+        let fault = format!("{} and {} are not parts of one sweep: {why}", one.display(), other.display());
+        Self::new(
+            fault,
+            "merge the shards of one command line, of one version of the program and with the same files",
+        )
     }
 
     fn unreadable(path: &Path, fault: impl Display) -> Self {
@@ -185,7 +277,7 @@ pub fn read(dir: &Path) -> Result<StoredSweep, SweepError> {
         let fault = format!("neither {unfinished} nor {out} holds a sweep");
         return Err(SweepError::new(fault, "give the --out of a sweep, finished or not"));
     };
-    let begun: JournalHeader = parsed(&folder.join(REQUEST), |text| Ok(serde_json::from_slice(text)?))?;
+    let begun: JournalHeader = parsed(&folder.join(REQUEST), Summed::read)?;
     let (rows, whole) = parsed(&folder.join(RUNS), whole_rows)?;
     let design = begun.request.design(|_, _| false);
     let design = design.map_err(|error| SweepError::unreadable(&folder.join(REQUEST), error))?;
@@ -199,16 +291,7 @@ pub fn read(dir: &Path) -> Result<StoredSweep, SweepError> {
 
 /// Contents of a file of a sweep.
 fn parsed<T>(path: &Path, parse: impl FnOnce(&[u8]) -> io::Result<T>) -> Result<T, SweepError> {
-    let read = || parse(&require_regular(path).and_then(|()| fs::read(path))?);
-    read().map_err(|error| SweepError::unreadable(path, error))
-}
-
-/// Refuses a link, which may lead to a file that is not flockform's, and a pipe, which may never end.
-fn require_regular(path: &Path) -> io::Result<()> {
-    match fs::symlink_metadata(path)?.is_file() {
-        true => Ok(()),
-        false => Err(io::Error::other("it is no regular file")),
-    }
+    read_regular(path).and_then(|text| parse(&text)).map_err(|error| SweepError::unreadable(path, error))
 }
 
 /// The rows without the last line where a kill cut that, and how many bytes they take.
@@ -219,7 +302,7 @@ fn whole_rows(text: &[u8]) -> io::Result<(Vec<Row>, u64)> {
     let (mut rows, mut whole) = (Vec::new(), 0);
     for (n, line) in text.split_inclusive(|&byte| byte == b'\n').enumerate() {
         let next = whole + line.len();
-        match serde_json::from_slice(line) {
+        match Summed::read(line) {
             Ok(row) if line.ends_with(b"\n") => rows.push(row),
             _ if next == text.len() => break,
             _ => return Err(io::Error::other(format!("line {} is damaged", n + 1))),
@@ -246,7 +329,7 @@ impl Journal {
         begun: &JournalHeader,
         rows: &[Row],
     ) -> Result<Self, ExportError> {
-        summary::write_json(folder, REQUEST, begun)?;
+        summary::write_json(folder, REQUEST, &Summed::new(begun))?;
         let path = folder.path(RUNS);
         let lines: Result<Vec<String>, _> = rows.iter().map(line).collect();
         write_file(&path, lines.map_err(ExportError::io("write", &path))?.concat())?;
@@ -294,7 +377,7 @@ impl Journal {
 }
 
 fn line(row: &Row) -> Result<String, serde_json::Error> {
-    Ok(serde_json::to_string(row)? + "\n")
+    Ok(serde_json::to_string(&Summed::new(row))? + "\n")
 }
 
 #[cfg(test)]
@@ -309,6 +392,7 @@ mod tests {
             outputs,
             reason: "a\nline".into(),
             cautions: vec!["so".into()],
+            files: BTreeMap::from([("a.csv".into(), Some(7)), ("b.csv".into(), None)]),
         }
     }
 
@@ -321,6 +405,37 @@ mod tests {
         let two = lines[..2].concat();
         for cut in two.len()..all.len() {
             assert_eq!(read(&all[..cut]), ((0..2).map(row).collect(), two.len() as u64), "{cut}");
+        }
+    }
+
+    #[test]
+    fn a_bit_that_changed_is_found_or_changes_nothing() {
+        let text: Vec<u8> = (0..2).flat_map(|run| line(&row(run)).unwrap().into_bytes()).collect();
+        let rows = [row(0), row(1)];
+        let request = SweepRequest {
+            scene: "tension".into(),
+            set: vec!["stop.steps=2".into()],
+            vary: vec!["update.damping=0.5:1:2".into()],
+            samples: Some((2, Sampling::Random, 7)),
+            outputs: vec!["residual".into()],
+            shard: Shard { number: 1, of: 2 },
+            force: false,
+        };
+        let begun = JournalHeader { program: "p".into(), version: "1".into(), scene_crc32: 8, request };
+        let written = serde_json::to_vec_pretty(&Summed::new(&begun)).unwrap();
+        for bit in 0..8 * text.len() {
+            let mut text = text.clone();
+            text[bit / 8] ^= 1 << (bit % 8);
+            // A last line may be one that a kill cut: it is made again.
+            assert!(
+                whole_rows(&text).is_ok_and(|(read, _)| rows.starts_with(&read))
+                    || whole_rows(&text).is_err()
+            );
+        }
+        for bit in 0..8 * written.len() {
+            let mut text = written.clone();
+            text[bit / 8] ^= 1 << (bit % 8);
+            assert!(Summed::<JournalHeader>::read(&text).map_or(true, |read| read == begun), "{bit}");
         }
     }
 

@@ -12,7 +12,9 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 pub(super) use journal::REQUEST;
-pub use journal::{Journal, JournalHeader, Row, StoredSweep, SweepError, SweepRequest, read};
+pub use journal::{
+    Journal, JournalHeader, Row, StoredSweep, SweepError, SweepRequest, checksums, gather, read,
+};
 pub use outputs::{Output, Probed, Quantity, Values};
 
 use super::OutputFolder;
@@ -151,7 +153,8 @@ mod tests {
         let outputs = ["strain".to_owned()];
         let row = |(run, (value, stop_reason)): (usize, (&str, &str))| {
             let [outputs, cautions] = [vec![value.to_owned()], Vec::new()];
-            (run, Row { run, stop_reason: stop_reason.into(), outputs, reason: String::new(), cautions })
+            let (stop_reason, reason, files) = (stop_reason.into(), String::new(), BTreeMap::new());
+            (run, Row { run, stop_reason, outputs, reason, cautions, files })
         };
         let ends = [("1.0", "steps"), ("2.0", "steps"), ("3.0", "equilibrium"), ("2600.0", "diverged")];
         let rows = ends.into_iter().enumerate().map(row).collect();

@@ -92,9 +92,12 @@ pub(crate) enum Content {
 
 /// Whether an override sets what stands at a key or below it, so that one of that key after it leaves nothing of it.
 pub fn is_lost_to(text: &str, key: &str) -> bool {
-    let paths = overrides::split_assignment(text)
-        .map(|(path, _)| [path, key].map(|path| overrides::parse_path(path).ok()));
-    let Some([Some(path), Some(key)]) = paths else { return false };
+    overrides::split_assignment(text).is_some_and(|(path, _)| is_within(path, key))
+}
+
+/// Whether a key path, however it is spelt, is that of a key or of what stands below it.
+pub(crate) fn is_within(path: &str, key: &str) -> bool {
+    let [Ok(path), Ok(key)] = [path, key].map(overrides::parse_path) else { return false };
     let is_same = |(a, b): (&Segment, &Segment)| a == b || a.index().is_some() && a.index() == b.index();
     path.len() >= key.len() && path.iter().zip(&key).all(is_same)
 }

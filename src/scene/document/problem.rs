@@ -25,6 +25,11 @@ pub enum Place {
         /// The text after `--set`.
         text: String,
     },
+    /// A value that a study gives to a key.
+    Varied {
+        /// The key and the value, as an override has them.
+        text: String,
+    },
 }
 
 impl fmt::Display for Place {
@@ -33,6 +38,7 @@ impl fmt::Display for Place {
             Place::Line { file, line } => write!(f, "{file}:{line}"),
             Place::File { file } => f.write_str(file),
             Place::Override { text } => write!(f, "--set {text}"),
+            Place::Varied { text } => write!(f, "--vary {text}"),
         }
     }
 }
@@ -97,6 +103,18 @@ impl SceneError {
         self.problems.len() >= KEPT_PROBLEMS
     }
 
+    /// The same of a scene that a study has given these overrides.
+    pub fn varied_by(mut self, overrides: &[String]) -> Self {
+        for Problem { place, .. } in &mut self.problems {
+            if let Place::Override { text } = place
+                && overrides.contains(text)
+            {
+                *place = Place::Varied { text: std::mem::take(text) };
+            }
+        }
+        self
+    }
+
     /// The problems that were kept.
     pub fn problems(&self) -> &[Problem] {
         &self.problems
@@ -115,7 +133,7 @@ impl SceneError {
         self.problems.sort_by_key(|problem| match problem.place {
             Place::File { .. } => 0,
             Place::Line { line, .. } => line,
-            Place::Override { .. } => usize::MAX,
+            Place::Override { .. } | Place::Varied { .. } => usize::MAX,
         });
         Err(self)
     }

@@ -13,6 +13,8 @@ use serde::{Deserialize, Serialize};
 use draws::{Draws, latin_column};
 pub use factor::{Factor, Level};
 
+use crate::scene::document::is_within;
+
 /// Most runs of a design: their tables are kept in memory.
 const MOST_RUNS: usize = 1_000_000;
 
@@ -32,9 +34,11 @@ pub enum DesignError {
         /// The fault.
         reason: String,
     },
-    /// Two entries for one key.
-    #[error("--vary {0} is given twice\n  help: one list or range per key")]
-    Twice(String),
+    /// Two entries that set one key, of which one may be a part of the other.
+    #[error(
+        "one key is given twice, by --vary {0} and by --vary {1}\n  help: give one list or range per key, of which none is a part of another"
+    )]
+    Twice(String, String),
     /// More runs than are kept.
     #[error(
         "the sweep has more than {MOST_RUNS} runs, or {MOST_VALUES} values in all of them\n  help: vary fewer keys, take fewer values, or draw --samples"
@@ -138,9 +142,14 @@ fn fits(runs: usize, keys: usize) -> bool {
 }
 
 fn require_distinct(factors: &[Factor]) -> Result<(), DesignError> {
-    let twice =
-        factors.iter().enumerate().find(|(k, one)| factors[..*k].iter().any(|two| two.key == one.key));
-    twice.map_or(Ok(()), |(_, factor)| Err(DesignError::Twice(factor.key.clone())))
+    for (k, Factor { key, .. }) in factors.iter().enumerate() {
+        let clashes =
+            |other: &&Factor| *key == other.key || is_within(key, &other.key) || is_within(&other.key, key);
+        if let Some(other) = factors[..k].iter().find(clashes) {
+            return Err(DesignError::Twice(other.key.clone(), key.clone()));
+        }
+    }
+    Ok(())
 }
 
 /// A part of a sweep's runs: every `of`th one.
@@ -353,6 +362,19 @@ mod tests {
         let refused = |design: Result<Design, DesignError>| design.expect_err("refused").to_string();
         assert!(refused(Design::grid(factors(&["a=1:2"]))).contains("number of values is missing"));
         assert!(refused(Design::grid(factors(&["a=1:2:3", "a=[1]"]))).contains("twice"));
+        for [one, other] in [
+            ["update=[{damping=0.5}]", "update.damping=[0.6]"],
+            ["update.damping=[0.6]", "update=[{damping=0.5}]"],
+            ["update.damping=[0.6]", "update . damping=[0.5]"],
+            ["update.damping=[0.6]", "update.\"damping\"=[0.5]"],
+            ["roles[1].motion=[1]", "roles[01].motion.kind=[2]"],
+            ["roles[1].motion=[1]", "roles.1.motion=[2]"],
+        ] {
+            assert!(refused(Design::grid(factors(&[one, other]))).contains("twice"), "{one} {other}");
+        }
+        assert!(
+            Design::grid(factors(&["roles[1].from=[1]", "roles[2].from=[2]", "roles[1].until=[3]"])).is_ok()
+        );
         assert!(refused(Design::grid(factors(&["a=0:1:2000", "b=0:1:2000"]))).contains("more than"));
         // A thousand values of each of nine keys would not fit into memory before they are counted.
         let many = |count: &str| -> Vec<Factor> {
