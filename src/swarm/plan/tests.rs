@@ -1,5 +1,6 @@
 //! Plans against what is computed by hand, and against flights.
 
+mod frames;
 mod speed;
 
 use super::*;
