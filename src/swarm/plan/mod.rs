@@ -28,7 +28,7 @@ mod words;
 
 use serde::Serialize;
 
-use super::formation::Formation;
+use super::formation::{Formation, Seen};
 use crate::flock::manoeuvre::{Demand, Manoeuvre};
 use crate::flock::rounding::{ROUNDING, at_most};
 use crate::flock::vectors::distance;
@@ -69,7 +69,7 @@ pub struct SwarmPlan {
     pub robots: usize,
     /// Those of them that lead.
     pub leaders: usize,
-    /// Neighbours of a follower, in the mean \[1\].
+    /// Neighbours of a follower, in the mean; at the start where they are found anew \[1\].
     pub neighbours: f64,
     /// Smallest distance between two places of the formation \[m\]; absent for a single robot.
     pub spacing: Option<f64>,
@@ -203,7 +203,7 @@ impl SwarmPlan {
             title: raw.title.clone(),
             robots: formation.count(),
             leaders,
-            neighbours: neighbours(formation),
+            neighbours: neighbours(started(&flight).as_ref().unwrap_or(formation)),
             spacing: (formation.count() > 1).then(|| formation.spacing()),
             free_space: free_space(formation),
             model: flight.fleet().model().name(),
@@ -242,6 +242,18 @@ impl SwarmPlan {
             .collect();
         Ok(plan)
     }
+}
+
+/// The formation with the neighbours that are found as the flight starts; `None` where they last, or a scene leads.
+fn started(flight: &Flight) -> Option<Formation> {
+    let mut formation = flight.control().formation().clone();
+    let lasts = formation.engine()?.lasting_neighbours().is_some();
+    if lasts || !formation.is_led_here() {
+        return None;
+    }
+    let (present, known) = (flight.fleet().places(), vec![true; formation.count()]);
+    formation.advance(&Seen { present: &present, known: &known }, &mut [], 0.0, 1, &mut present.clone());
+    Some(formation)
 }
 
 fn neighbours(formation: &Formation) -> f64 {

@@ -1,6 +1,7 @@
 //! Plans against what is computed by hand, and against flights.
 
 mod frames;
+mod present;
 mod speed;
 
 use super::*;

@@ -2,7 +2,7 @@
 
 mod network;
 
-use super::{ManoeuvreSpeed, needed};
+use super::{ManoeuvreSpeed, needed, started};
 use crate::continuum::late::beyond;
 use crate::flock::block::apply;
 use crate::flock::manoeuvre::{Leg, Manoeuvre};
@@ -34,7 +34,7 @@ pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
         short_faults(raw),
         hidden_fault(raw),
         late_commands(flight, raw),
-        unled(formation),
+        unled(flight),
         outside(flight, "start", &|m| flight.fleet().robots()[m].position),
         (!raw.flight.start.is_empty())
             .then(|| outside(flight, "have their places in the formation", &|m| formation.places.get(m)))
@@ -106,14 +106,22 @@ fn late_commands(flight: &Flight, raw: &RawSwarm) -> Option<String> {
     beyond(&format!("the end of the flight, after {periods} periods"), keys, "flight.duration")
 }
 
-fn unled(formation: &Formation) -> Option<String> {
+fn unled(flight: &Flight) -> Option<String> {
+    let formation = flight.control().formation();
     let unled = formation.unled();
     if unled.len() == formation.count() {
         return Some("no robot leads: the formation goes nowhere; add [[leaders]]".into());
     }
+    if let Some(names) = formation.named(|m| unled.contains(&m)) {
+        return Some(format!(
+            "no leader reaches {names}: these robots follow each other alone; link them to the others, or let one of them lead"
+        ));
+    }
+    let unled = started(flight)?.unreached();
     let names = formation.named(|m| unled.contains(&m))?;
     Some(format!(
-        "no leader reaches {names}: these robots follow each other alone; link them to the others, or let one of them lead"
+        "no leader reaches {names} at the start: these robots follow each other alone, or stand, until others come near; link \
+         them farther, let them start nearer, or let one of them lead"
     ))
 }
 
