@@ -2,6 +2,7 @@
 
 mod frames;
 mod present;
+mod programs;
 mod speed;
 
 use super::*;
