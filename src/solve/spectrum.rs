@@ -98,6 +98,36 @@ impl<'a> LinearSweep<'a> {
         Ends { lowest: low.re, highest: high.re, are_real, iterations, converged }
     }
 
+    /// The spectral radius of a period of these sweeps that takes the followers to be where they were `delay` periods before, while the
+    /// frame remembers its last sweep: to 1e-4 of how far it is from 1. `None` where finding it would take long.
+    pub fn delayed_radius(&self, sweeps: usize, delay: usize) -> Option<f64> {
+        /// Most particles swept and numbers made orthogonal, these at 50 of the others each, in all: more would take seconds.
+        const MOST_WORK: usize = 100_000_000;
+        let count = self.roles.len();
+        let most = self.most.min(MOST_WORK / (count * (sweeps + 50 * (delay + 1))));
+        let (mut present, mut next) = (Vectors::zeros(count), Vectors::zeros(count));
+        // A block of them for now and for each period back.
+        let mut apply = |from: &[f64], to: &mut [f64]| {
+            for i in 0..count {
+                let block = if self.roles[i] == Role::Frame { 0 } else { delay * count };
+                present.set(i, [from[2 * (block + i)], from[2 * (block + i) + 1]]);
+            }
+            for _ in 0..sweeps {
+                next.clone_from(&present);
+                self.sweep.step(&self.flock, self.frame, &present, &mut next);
+                std::mem::swap(&mut present, &mut next);
+            }
+            to[2 * count..].copy_from_slice(&from[..2 * delay * count]);
+            for i in 0..count {
+                [to[2 * i], to[2 * i + 1]] = present.get(i);
+            }
+        };
+        let mut start = self.start();
+        start.resize(2 * count * (delay + 1), 0.0);
+        let found = eigenvalues(&mut apply, start, (Wanted::Modulus, Accuracy::FromOne(1e-4)), most);
+        found.converged.then(|| found.eigenvalues[0].value.norm())
+    }
+
     fn radius_to(&self, accuracy: Accuracy) -> SpectralRadius {
         let (found, iterations, converged) = self.eigenvalues((Wanted::Modulus, accuracy));
         SpectralRadius { radius: found[0].value.norm(), iterations, converged }

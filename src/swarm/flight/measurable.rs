@@ -15,15 +15,16 @@ pub fn require(swarm: &Swarm, flight: &Flight) -> Result<(), SceneError> {
     // A scene changes the roles on its way, and with them the place of rest.
     let has_shape = has_affine || !formation.is_led_here() || formation.settled(&formation.places).is_some();
     let has_solids = formation.count() > 1 || !swarm.raw.obstacles.is_empty();
-    let no_affine = "the leaders' motion is not affine, so no robot has a place by it";
+    let no_affine = "the leaders do not all fly one manoeuvre, so no robot has a place by it";
     let unled = formation.unled();
     let led = "let a leader reach every robot by links that last, or leave the bound out";
     let (no_shape, shaped) = match (formation.named(|m| unled.contains(&m)), formation.no_rest()) {
         (Some(names), _) => (format!("no leader reaches {names}"), led),
         (None, why) => {
             let why = why.map_or(String::new(), |why| format!(": {why}"));
-            let why =
-                format!("the leaders' motion is not affine, and no place of rest behind them is known{why}");
+            let why = format!(
+                "the leaders do not all fly one manoeuvre, and no place of rest behind them is known{why}"
+            );
             (why, "let all leaders follow one manoeuvre, or leave the bound out")
         }
     };

@@ -13,12 +13,19 @@ const MOST_NAMED: usize = 6;
 impl Formation {
     /// Members that no leader reaches by links that last, ascending; none where a scene leads, or links do not last.
     pub fn unled(&self) -> Vec<usize> {
-        let mut reached: Vec<bool> = (0..self.count()).map(|m| self.leads(m)).collect();
         let is_judged = match self.engine().filter(|_| self.is_led_here()) {
             None => false,
-            Some(engine) => engine.lasting_neighbours().is_some() || !reached.contains(&true),
+            Some(engine) => {
+                engine.lasting_neighbours().is_some() || !(0..self.count()).any(|m| self.leads(m))
+            }
         };
-        let mut grows = is_judged;
+        if is_judged { self.unreached() } else { Vec::new() }
+    }
+
+    /// Members that no leader reaches by the links of now, ascending.
+    pub(in crate::swarm) fn unreached(&self) -> Vec<usize> {
+        let mut reached: Vec<bool> = (0..self.count()).map(|m| self.leads(m)).collect();
+        let mut grows = true;
         while std::mem::take(&mut grows) {
             for m in 0..self.count() {
                 if !reached[m] && self.neighbours(m).any(|other| reached[other]) {
@@ -26,7 +33,7 @@ impl Formation {
                 }
             }
         }
-        (0..self.count()).filter(|&m| is_judged && !reached[m]).collect()
+        (0..self.count()).filter(|&m| !reached[m]).collect()
     }
 
     /// The member of a name that stands at `key`.

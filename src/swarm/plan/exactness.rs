@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::not_linear;
-use crate::flock::manoeuvre::{Affine, Posture};
+use crate::flock::manoeuvre::{Affine, Posture, highest};
 use crate::flock::role::Role;
 use crate::flock::rounding::ROUNDING;
 use crate::flock::vectors::{Vectors, distance};
@@ -108,34 +108,15 @@ fn needed(formation: &Formation) -> Vec<Needed> {
 fn on_the_way(formation: &Formation, name: &str) -> Option<ManoeuvreError> {
     /// Parts of a leg at whose ends the places are compared.
     const PARTS: usize = 16;
-    /// Times that the part of a leg around the largest distance is narrowed, by a third each.
-    const NARROWINGS: usize = 24;
     let manoeuvre = formation.manoeuvre(name, 0.0)?;
     let mut found: f64 = 0.0;
     let mut start = 0.0;
     for leg in &manoeuvre.legs {
         let begun = start;
         start += leg.seconds + leg.hold;
-        let at = |part: f64| largest(formation, manoeuvre.affine(begun + leg.seconds * part));
-        let looks: Option<Vec<f64>> = (0..=PARTS).map(|n| at(n as f64 / PARTS as f64)).collect();
-        let looks = looks?;
-        let best = (0..=PARTS).max_by(|&a, &b| looks[a].total_cmp(&looks[b]))?;
-        found = found.max(looks[best]);
-        if looks[best] == 0.0 {
-            continue;
-        }
-        let [mut low, mut high] =
-            [best.saturating_sub(1), (best + 1).min(PARTS)].map(|n| n as f64 / PARTS as f64);
-        for _ in 0..NARROWINGS {
-            let third = (high - low) / 3.0;
-            let [first, second] = [at(low + third)?, at(high - third)?];
-            found = found.max(first).max(second);
-            if first < second {
-                low += third;
-            } else {
-                high -= third;
-            }
-        }
+        // It is known, as it was of the families.
+        let at = |part: f64| largest(formation, manoeuvre.affine(begun + leg.seconds * part)).unwrap_or(0.0);
+        found = found.max(highest(PARTS, at));
     }
     Some(ManoeuvreError { name: name.to_owned(), largest: found })
 }

@@ -4,7 +4,8 @@
 //! the leaders' seen places `x_L` and led places `l`. The map is taken from the loop itself, column by column. With it:
 //!
 //! * the formation forgets a disturbance by the spectral radius of `A` in a period; a delay of `d` periods makes that
-//!   its `d + 1`st root, which is below 1 as well: delay slows the formation and never makes it grow;
+//!   its `d + 1`st root, which is below 1 as well: delay slows the formation and never makes it grow. A frame that lags remembers the
+//!   last sweep, which no pose delays: there it is the radius of the joint map of the frame and of the places of the last `d + 1` periods;
 //! * noise of the poses moves a follower by the root of the diagonal of `C = A C A' + A A' + B B'` times that noise;
 //! * behind leaders that move steadily a follower lags by the row `n` of `(1 - A)^-1 (A + B) 1` times their way in a period,
 //!   `d + 1` times that under a delay of `d` periods, if a shift of all takes all targets along: `(A + B + D) 1 = 1`. Otherwise it
@@ -12,12 +13,13 @@
 //! * where each robot is kept a way `b` behind its target, in which it could brake, it is `n b` farther behind the leaders,
 //!   and `(n + 1) b` behind their program, behind which they are themselves.
 //!
-//! For many followers, or with a frame, which remembers, the lag is that of the loop itself, run until it is steady. A frame's memory
-//! is none of the poses, so there the loop is run with the delay.
+//! For many followers, or with a frame, which remembers, the lag is that of the loop itself, run until it is steady; where the frame
+//! lags it is run with the delay.
 //!
 //! A loop that is not linear has no such map, and nothing of this is stated of it.
 
 pub mod cautions;
+mod convergence;
 mod exactness;
 mod period_map;
 #[cfg(test)]
@@ -26,23 +28,20 @@ mod words;
 
 use serde::Serialize;
 
-use super::formation::Formation;
+use super::formation::{Formation, Seen};
 use crate::flock::manoeuvre::{Demand, Manoeuvre};
 use crate::flock::rounding::{ROUNDING, at_most};
 use crate::flock::vectors::distance;
 use crate::scene::SceneError;
 use crate::scene::swarm::{Shape, Swarm};
 use crate::scene::text::decimals;
-use crate::solve::spectrum::LinearSweep;
 use crate::swarm::flight::Flight;
 use crate::swarm::robots::DoubleIntegrator;
 use crate::swarm::safety::Limits;
+use convergence::{convergence, delayed_factor, half_life, remembers};
 use exactness::keeps_to_shift;
 pub use exactness::{Exactness, ManoeuvreError};
 use period_map::{PeriodMap, lag_when_led};
-
-/// Sweeps made to find the spectral radius.
-const MOST_SWEEPS: usize = 5000;
 
 /// A lag below this sets no speed: what it allows is far above that of any robot \[s\].
 const LEAST_LAG: f64 = 1e-3;
@@ -52,6 +51,9 @@ const NEVER_STEADY: &str = "disturbances do not die out";
 
 /// The reason for which no lag is known of followers that fall behind, or aside, by more and more.
 const NOT_KEPT: &str = "followers do not keep to a shift of the leaders";
+
+/// The reason for which nothing is known of a formation that is too large for it.
+const TAKES_LONG: &str = "it would take long to compute for so many robots";
 
 /// Standard deviations of noise that each robot keeps farther away from everything.
 const DEVIATIONS_KEPT: f64 = 3.0;
@@ -67,7 +69,7 @@ pub struct SwarmPlan {
     pub robots: usize,
     /// Those of them that lead.
     pub leaders: usize,
-    /// Neighbours of a follower, in the mean \[1\].
+    /// Neighbours of a follower, in the mean; at the start where they are found anew \[1\].
     pub neighbours: f64,
     /// Smallest distance between two places of the formation \[m\]; absent for a single robot.
     pub spacing: Option<f64>,
@@ -129,8 +131,13 @@ pub struct DelayMargin {
     /// Age from which on two robots at their places may be too near for all that poses say, so that they hold each other where
     /// no node sends both their targets \[s\]; absent where robots are not kept apart, or are predicted.
     pub room_s: Option<f64>,
-    /// Time in which the slowest part of a disturbance halves under the simulated delay \[s\].
+    /// Largest part of a disturbance that is left after a period under the simulated delay \[1\].
+    pub factor: Option<f64>,
+    /// Time in which the slowest part of a disturbance halves under that delay \[s\].
     pub half_life_s: Option<f64>,
+    /// Whether a frame remembers the last sweep, which poses do not delay.
+    #[serde(skip)]
+    pub frame_remembers: bool,
 }
 
 /// How fast the formation can be led.
@@ -186,15 +193,17 @@ impl SwarmPlan {
         .map_err(|why| if leaders == formation.count() { "every robot leads" } else { why });
         let map = PeriodMap::of(formation, raw.control.sweeps).filter(|_| not_linear.is_none());
         let exactness = Exactness::of(swarm, formation);
-        let lag = lag(swarm, formation, map.as_ref(), predicted, exactness.as_ref());
         let convergence = predicted.ok();
         let delay = f64::from(longest_delay(swarm));
+        let delayed = convergence.and_then(|one| delayed_factor(formation, swarm, one.factor));
+        let lag =
+            lag(swarm, formation, map.as_ref(), predicted.map(|one| (one, delayed)), exactness.as_ref());
         let mut plan = Self {
             name: swarm.name.clone(),
             title: raw.title.clone(),
             robots: formation.count(),
             leaders,
-            neighbours: neighbours(formation),
+            neighbours: neighbours(started(&flight).as_ref().unwrap_or(formation)),
             spacing: (formation.count() > 1).then(|| formation.spacing()),
             free_space: free_space(formation),
             model: flight.fleet().model().name(),
@@ -212,7 +221,11 @@ impl SwarmPlan {
                 // Of an exact multiple all periods count, whatever rounding makes of it.
                 largest_periods: (raw.poses.age_limit / period * (1.0 + ROUNDING)) as usize,
                 room_s: room_for_delay(formation, flight.control().limits()),
-                half_life_s: convergence.and_then(|one| Some(one.half_life_s? * (delay + 1.0))),
+                factor: delayed,
+                half_life_s: delayed
+                    .filter(|&factor| factor < 1.0)
+                    .map(|factor| period * half_life(factor).max(delay + 1.0)),
+                frame_remembers: remembers(formation),
             },
             speed: speed(swarm, &flight, lag),
             exactness,
@@ -229,6 +242,18 @@ impl SwarmPlan {
             .collect();
         Ok(plan)
     }
+}
+
+/// The formation with the neighbours that are found as the flight starts; `None` where they last, or a scene leads.
+fn started(flight: &Flight) -> Option<Formation> {
+    let mut formation = flight.control().formation().clone();
+    let lasts = formation.engine()?.lasting_neighbours().is_some();
+    if lasts || !formation.is_led_here() {
+        return None;
+    }
+    let (present, known) = (flight.fleet().places(), vec![true; formation.count()]);
+    formation.advance(&Seen { present: &present, known: &known }, &mut [], 0.0, 1, &mut present.clone());
+    Some(formation)
 }
 
 fn neighbours(formation: &Formation) -> f64 {
@@ -284,22 +309,6 @@ fn not_linear(formation: &Formation, swarm: &Swarm) -> Option<&'static str> {
     }
 }
 
-fn convergence(formation: &Formation, swarm: &Swarm) -> Option<Convergence> {
-    let engine = formation.engine()?;
-    let frame = engine.body().frame.as_ref();
-    let sweep = LinearSweep::new(engine.flock(), frame, engine.roles(), engine.update(), MOST_SWEEPS)?;
-    let found = sweep.radius();
-    let factor = found.radius.powf(swarm.raw.control.sweeps as f64);
-    let halves = factor < 1.0;
-    let half_life_s = halves.then(|| swarm.raw.control.period * half_life(factor));
-    Some(Convergence { factor, half_life_s })
-}
-
-/// Periods in which what is left by this factor a period is a half; none is shorter than one.
-fn half_life(factor: f64) -> f64 {
-    (0.5_f64.ln() / factor.max(f64::MIN_POSITIVE).ln()).max(1.0)
-}
-
 /// Periods by which poses are late at most in the simulated flight.
 fn longest_delay(swarm: &Swarm) -> u32 {
     swarm.raw.flight.delay + swarm.raw.flight.jitter
@@ -319,27 +328,32 @@ fn lag(
     swarm: &Swarm,
     formation: &Formation,
     map: Option<&PeriodMap>,
-    convergence: Result<Convergence, &'static str>,
+    convergence: Result<(Convergence, Option<f64>), &'static str>,
     exactness: Option<&Exactness>,
 ) -> Result<Lag, &'static str> {
     if formation.is_led_here() && (0..formation.count()).all(|m| formation.leads(m)) {
         return Ok(Lag { prompt: 0.0, delayed: 0.0 });
     }
-    let Convergence { factor, .. } = convergence?;
+    let (Convergence { factor, .. }, delayed) = convergence?;
     // 1 - A has an inverse where disturbances grow too, but no lag comes of it.
-    if factor >= 1.0 {
+    if factor >= 1.0 || delayed.is_some_and(|factor| factor >= 1.0) {
         return Err(NEVER_STEADY);
     }
     let axes = followed_axes(formation, exactness).ok_or(NOT_KEPT)?;
     let delay = longest_delay(swarm);
-    let led = |delay| lag_when_led((formation, swarm.raw.control.sweeps), axes, factor, delay);
+    let led = |factor, delay| {
+        lag_when_led((formation, swarm.raw.control.sweeps), axes, factor, delay).ok_or(TAKES_LONG)
+    };
     let prompt = match map {
         Some(map) => map.lag(axes).ok_or(NEVER_STEADY)?,
-        None => led(0).ok_or("it would take long to compute for so many robots")?,
+        None => led(factor, 0)?,
     };
-    let has_frame = formation.engine().is_some_and(|engine| engine.body().frame.is_some());
-    let run = if has_frame && delay > 0 { led(delay) } else { None };
-    Ok(Lag { prompt, delayed: run.unwrap_or(prompt * (f64::from(delay) + 1.0)) })
+    let delayed = match delayed {
+        Some(factor) if remembers(formation) => led(factor, delay)?,
+        None => return Err(TAKES_LONG),
+        Some(_) => prompt * (f64::from(delay) + 1.0),
+    };
+    Ok(Lag { prompt, delayed })
 }
 
 /// The axes along which leaders go and followers keep to a shift of theirs; `None` where leaders may go another way too.
@@ -462,6 +476,8 @@ fn leg_by_leg(manoeuvre: &Manoeuvre) -> impl Iterator<Item = Manoeuvre> + '_ {
 }
 
 fn lasting(plan: &SwarmPlan) -> Option<String> {
-    let Some(Convergence { factor, half_life_s: None }) = plan.convergence else { return None };
+    // Where that is not known, as it is without the delay.
+    let prompt = plan.convergence.map(|one| one.factor);
+    let factor = plan.delay.factor.or(prompt).filter(|&factor| factor >= 1.0)?;
     Some(format!("disturbances do not die out: {factor:.4} of the slowest is left after a period"))
 }

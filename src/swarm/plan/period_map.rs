@@ -83,8 +83,8 @@ fn largest(axes: [bool; 2], along: impl Fn(usize) -> Option<f64>) -> Option<f64>
 }
 
 /// The largest lag of a follower behind leaders that move by 1 in a period along any of these axes \[period\], by leading the formation
-/// until its lag is steady: it forgets all but `factor` of what it lacks of that in a period, or in one and as many as poses are late by,
-/// `delay`. `None` where that takes long.
+/// until its lag is steady: it forgets all but `factor` of what it lacks of that in a period, behind poses that are late by `delay`
+/// periods. `None` where that takes long.
 pub(super) fn lag_when_led(
     (formation, sweeps): (&Formation, usize),
     axes: [bool; 2],
@@ -93,7 +93,7 @@ pub(super) fn lag_when_led(
 ) -> Option<f64> {
     let late = delay as usize + 1;
     let forgotten = (STEADY.ln() / factor.max(f64::MIN_POSITIVE).ln()).ceil();
-    let periods = (forgotten + 1.0) * late as f64;
+    let periods = forgotten + late as f64;
     if periods * (sweeps * formation.count()) as f64 > MOST_TARGETS {
         return None;
     }

@@ -1,5 +1,8 @@
 //! Plans against what is computed by hand, and against flights.
 
+mod frames;
+mod present;
+mod programs;
 mod speed;
 
 use super::*;

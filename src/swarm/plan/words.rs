@@ -2,7 +2,9 @@
 
 use std::fmt;
 
-use super::{Convergence, DelayMargin, Exactness, ManoeuvreError, ManoeuvreSpeed, SpeedMargin, SwarmPlan};
+use super::{
+    Convergence, DelayMargin, Exactness, ManoeuvreError, ManoeuvreSpeed, SpeedMargin, SwarmPlan, TAKES_LONG,
+};
 use crate::scene::text::{counted, decimals, listed};
 
 /// Smaller values read as zero to three places.
@@ -48,12 +50,18 @@ impl fmt::Display for SwarmPlan {
                     "comes to rest",
                     format!("a disturbance halves {halves}; {left} is left after a period"),
                 )?;
-                let delayed = half_life(self.delay.half_life_s);
-                let with = match self.delay.simulated_s {
-                    0.0 => "none is simulated".into(),
-                    simulated => format!("with {simulated:.3} s the error halves {delayed}"),
+                let DelayMargin { simulated_s, factor, half_life_s, frame_remembers, .. } = self.delay;
+                let delayed = half_life(half_life_s);
+                let with = match (simulated_s, factor) {
+                    (0.0, _) => "none is simulated".into(),
+                    (simulated, Some(_)) => format!("with {simulated:.3} s the error halves {delayed}"),
+                    (simulated, None) => format!("with {simulated:.3} s not computed: {TAKES_LONG}"),
                 };
-                line("delay", format!("slows convergence, never destabilises: {with}"))?;
+                let does = match frame_remembers {
+                    true => "does not reach what the frame remembers",
+                    false => "slows convergence, never destabilises",
+                };
+                line("delay", format!("{does}: {with}"))?;
             }
             None => {
                 line("comes to rest", format!("not predicted: {}", self.not_predicted.unwrap_or_default()))?

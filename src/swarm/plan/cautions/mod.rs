@@ -2,10 +2,10 @@
 
 mod network;
 
-use super::{ManoeuvreSpeed, needed};
+use super::{ManoeuvreSpeed, needed, started};
 use crate::continuum::late::beyond;
 use crate::flock::block::apply;
-use crate::flock::manoeuvre::{Leg, Manoeuvre};
+use crate::flock::manoeuvre::{Demand, Leg, Manoeuvre, highest};
 use crate::flock::motion::{Interpolation, Keyframe, Motion};
 use crate::flock::rounding::{ROUNDING, at_most};
 use crate::flock::vectors::{Vectors, distance};
@@ -34,7 +34,7 @@ pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
         short_faults(raw),
         hidden_fault(raw),
         late_commands(flight, raw),
-        unled(formation),
+        unled(flight),
         outside(flight, "start", &|m| flight.fleet().robots()[m].position),
         (!raw.flight.start.is_empty())
             .then(|| outside(flight, "have their places in the formation", &|m| formation.places.get(m)))
@@ -106,14 +106,22 @@ fn late_commands(flight: &Flight, raw: &RawSwarm) -> Option<String> {
     beyond(&format!("the end of the flight, after {periods} periods"), keys, "flight.duration")
 }
 
-fn unled(formation: &Formation) -> Option<String> {
+fn unled(flight: &Flight) -> Option<String> {
+    let formation = flight.control().formation();
     let unled = formation.unled();
     if unled.len() == formation.count() {
         return Some("no robot leads: the formation goes nowhere; add [[leaders]]".into());
     }
+    if let Some(names) = formation.named(|m| unled.contains(&m)) {
+        return Some(format!(
+            "no leader reaches {names}: these robots follow each other alone; link them to the others, or let one of them lead"
+        ));
+    }
+    let unled = started(flight)?.unreached();
     let names = formation.named(|m| unled.contains(&m))?;
     Some(format!(
-        "no leader reaches {names}: these robots follow each other alone; link them to the others, or let one of them lead"
+        "no leader reaches {names} at the start: these robots follow each other alone, or stand, until others come near; link \
+         them farther, let them start nearer, or let one of them lead"
     ))
 }
 
@@ -283,39 +291,41 @@ fn commanded_astray<'a>(raw: &'a RawSwarm, flight: &'a Flight) -> impl Iterator<
     })
 }
 
-fn fast_manoeuvres(raw: &RawSwarm, formation: &Formation) -> impl Iterator<Item = String> {
-    let [fastest, most] =
-        [raw.limits.speed, raw.limits.acceleration].map(|limit| limit.unwrap_or(f64::INFINITY));
+fn fast_manoeuvres<'a>(raw: &'a RawSwarm, formation: &'a Formation) -> impl Iterator<Item = String> + 'a {
     let all = raw.manoeuvres.iter().filter_map(|one| needed(formation, &one.name));
-    all.flat_map(move |ManoeuvreSpeed { name, needed, acceleration }| {
-        let asked = [
-            (needed, fastest, "moves a robot's place at up to", "m/s, above limits.speed"),
-            (acceleration, most, "accelerates a robot's place at up to", "m/s^2, above limits.acceleration"),
-        ];
-        let above = asked.into_iter().filter(|(value, limit, ..)| !at_most(*value, *limit));
-        let words = above.map(|(value, _, asks, limit)| format!("{asks} {} {limit}", decimals(value, 3)));
-        let words: Vec<String> = words.collect();
-        (!words.is_empty()).then(|| {
-            format!(
-                "manoeuvre `{name}` {}: robots will fall behind; give its legs more seconds",
-                words.join(", and ")
-            )
-        })
+    all.filter_map(move |ManoeuvreSpeed { name, needed, acceleration }| {
+        let words = above_limits(raw, "a robot's place", Demand { speed: needed, acceleration })?;
+        Some(format!("manoeuvre `{name}` {words}: robots will fall behind; give its legs more seconds"))
     })
 }
 
 fn fast_paths(swarm: &Swarm, formation: &Formation) -> impl Iterator<Item = String> {
-    let limit = swarm.raw.limits.speed.unwrap_or(f64::INFINITY);
     (0..swarm.leaders.len()).filter_map(move |k| {
-        let fastest = motions(formation, k).map(|(_, motion)| speed(motion)).fold(0.0, f64::max);
-        (!at_most(fastest, limit)).then(|| {
-            format!(
-                "the program of leaders[{k}] moves a robot at up to {} m/s, above limits.speed: it will fall \
-                 behind; give its points more time",
-                decimals(fastest, 3)
-            )
-        })
+        let most = |most: Demand, (_, motion): (usize, &Motion)| {
+            let asked = demand(motion);
+            Demand {
+                speed: most.speed.max(asked.speed),
+                acceleration: most.acceleration.max(asked.acceleration),
+            }
+        };
+        let words = above_limits(&swarm.raw, "a robot", motions(formation, k).fold(Demand::default(), most))?;
+        Some(format!("the program of leaders[{k}] {words}: it will fall behind; give its points more time"))
     })
+}
+
+/// Words of what is asked of `moved` beyond a limit; none where nothing is.
+fn above_limits(raw: &RawSwarm, moved: &str, Demand { speed, acceleration }: Demand) -> Option<String> {
+    let [fastest, most] =
+        [raw.limits.speed, raw.limits.acceleration].map(|limit| limit.unwrap_or(f64::INFINITY));
+    let asked = [
+        (speed, fastest, "moves", "m/s, above limits.speed"),
+        (acceleration, most, "accelerates", "m/s^2, above limits.acceleration"),
+    ];
+    let above = asked.into_iter().filter(|(value, limit, ..)| !at_most(*value, *limit));
+    let words = above
+        .map(|(value, _, asks, limit)| format!("{asks} {moved} at up to {} {limit}", decimals(value, 3)));
+    let words: Vec<String> = words.collect();
+    (!words.is_empty()).then(|| words.join(", and "))
 }
 
 fn leaping_paths(swarm: &Swarm, flight: &Flight) -> impl Iterator<Item = String> {
@@ -365,39 +375,72 @@ fn leap(motion: &Motion) -> f64 {
     begins.zip(frames).map(|(from, to)| distance(from.displacement, to.displacement)).fold(0.0, f64::max)
 }
 
-/// Largest speed of a program by keyframes that goes from one to the next \[m/s\].
-fn speed(motion: &Motion) -> f64 {
-    let Motion::Keyframes { frames, interpolation: Interpolation::Linear | Interpolation::Smooth } = motion
-    else {
-        return 0.0;
+/// What a program by keyframes that goes from one to the next asks of a robot; at those where its velocity leaps no acceleration.
+fn demand(motion: &Motion) -> Demand {
+    let Motion::Keyframes { frames, interpolation } = motion else { return Demand::default() };
+    // The largest derivatives of the part of the way that is done.
+    let [pace, gain] = match interpolation {
+        Interpolation::Hold => return Demand::default(),
+        Interpolation::Linear => [1.0, 0.0],
+        Interpolation::Smooth => [1.5, 6.0],
     };
-    let times: Vec<f64> =
-        std::iter::once(0.0).chain(frames.iter().map(|Keyframe { step, .. }| *step)).collect();
-    let segment = |pair: &[f64]| {
-        let part = (pair[1] - pair[0]) / PARTS as f64;
-        let place = |k: usize| motion.displacement(pair[0] + k as f64 * part, 0, [0.0; 2]);
-        let moved = |k: usize| if part > 0.0 { distance(place(k), place(k + 1)) / part } else { 0.0 };
-        (0..PARTS).map(moved).fold(0.0, f64::max)
-    };
-    times.windows(2).map(segment).fold(0.0, f64::max)
+    let start = Keyframe { step: 0.0, displacement: [0.0; 2] };
+    let begins = std::iter::once(&start).chain(frames);
+    begins.zip(frames).filter(|(from, to)| to.step > from.step).fold(Demand::default(), |most, (from, to)| {
+        let (way, seconds) = (distance(from.displacement, to.displacement), to.step - from.step);
+        Demand {
+            speed: most.speed.max(pace * way / seconds),
+            acceleration: most.acceleration.max(gain * way / (seconds * seconds)),
+        }
+    })
 }
 
-/// Manoeuvres that bring two places nearer than the robots may be.
+/// Manoeuvres that bring two robots nearer than they may be, at their places or where followers come to rest.
 fn narrow(raw: &RawSwarm, formation: &Formation) -> impl Iterator<Item = String> {
     let clearance = raw.limits.clearance;
     raw.manoeuvres.iter().filter_map(move |one| {
         let manoeuvre = formation.manoeuvre(&one.name, 0.0)?;
-        let (free, i, j) = narrowest(formation, &manoeuvre)?;
-        (free < clearance? - ROUNDING).then(|| {
-            let [first, second] = [i, j].map(|m| &formation.names[m]);
-            format!(
-                "manoeuvre `{}` leaves {} m between `{first}` and `{second}` at their places, less than \
-                 limits.clearance: robots will be held off them; stretch or shear it less",
-                one.name,
-                decimals(free, 3)
-            )
-        })
+        let is_narrow =
+            |(free, ..): &(f64, usize, usize)| clearance.is_some_and(|least| *free < least - ROUNDING);
+        let at_places =
+            narrowest(formation, &manoeuvre).filter(is_narrow).map(|found| ("at their places", found));
+        let at_rest =
+            || Some(("where they come to rest", narrowest_rest(formation, &manoeuvre).filter(is_narrow)?));
+        let (which, (free, i, j)) = at_places.or_else(at_rest)?;
+        let [first, second] = [i, j].map(|m| &formation.names[m]);
+        Some(format!(
+            "manoeuvre `{}` leaves {} m between `{first}` and `{second}` {which}, less than \
+             limits.clearance: robots will be held off them; stretch or shear it less",
+            one.name,
+            decimals(free, 3)
+        ))
     })
+}
+
+/// The same where the followers come to rest behind leaders in a manoeuvre; `None` where that is not known.
+fn narrowest_rest(formation: &Formation, manoeuvre: &Manoeuvre) -> Option<(f64, usize, usize)> {
+    /// Looks at a leg less one, beside which the nearest are sought.
+    const LOOKS: usize = 16;
+    formation.settled(&formation.places).filter(|_| formation.is_led_here())?;
+    let nearest = std::cell::Cell::new((f64::INFINITY, 0, 0));
+    let mut begun = 0.0;
+    for leg in &manoeuvre.legs {
+        highest(LOOKS, |part| {
+            let affine = manoeuvre.affine(begun + leg.seconds * part);
+            let places = formation.places.iter().map(|place| affine.apply(place)).collect();
+            let rest = formation.settled(&places).unwrap_or(places);
+            let pairs = (0..rest.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
+            let free =
+                |(i, j)| (distance(rest.get(i), rest.get(j)) - formation.radii[i] - formation.radii[j], j, i);
+            let least = pairs.map(free).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or(nearest.get());
+            if least.0 < nearest.get().0 {
+                nearest.set(least);
+            }
+            -least.0
+        });
+        begun += leg.seconds + leg.hold;
+    }
+    Some(nearest.get())
 }
 
 /// Least free space between two robots at their places in a manoeuvre \[m\], and which two.
