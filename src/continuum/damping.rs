@@ -1,8 +1,8 @@
 //! How much a synchronous update must be damped along the edges of a body.
 //!
 //! Inside, the waves on the lattice say how far an update may go. Along the outline of a fitted body cells have other shapes, and
-//! along any edge fewer of them share a mean dilatation: the largest eigenvalue of `D^-1 K` may be larger. It belongs to a
-//! motion of a few particles there, which a power iteration over those near the edges finds.
+//! along any edge a particle has fewer of them, or fewer that share a mean dilatation: the largest eigenvalue of `D^-1 K` may be
+//! larger. It belongs to a motion of a few particles there, which a power iteration over those near the edges finds.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -22,21 +22,16 @@ const SAFETY: f64 = 1.03;
 /// Part of the largest damping at which nothing grows.
 const OF_LIMIT: f64 = 0.9;
 
-/// The damping of a synchronous update, at most `inside` \[1\], which suits the inside of the body. Where particles share means with those
-/// around them, `all` is how many neighbours one inside has. Of a body of which each rank has a part all find it together.
+/// The damping of a synchronous update, at most `inside` \[1\], which suits the inside of the body, where a particle has `all`
+/// neighbours. Of a body of which each rank has a part all find it together.
 pub fn along_edges(
     body: &Body,
     neighbours: &Neighbours,
     weights: &MatrixWeights,
-    (inside, all): (f64, Option<usize>),
+    (inside, all): (f64, usize),
     team: Option<&Team>,
 ) -> f64 {
-    if body.outline.is_none() && all.is_none() {
-        return inside;
-    }
-    let is_along = |i: usize| {
-        body.sites[i][0] == Body::ALONG_OUTLINE || all.is_some_and(|all| neighbours.of(i).len() < all)
-    };
+    let is_along = |i: usize| body.sites[i][0] == Body::ALONG_OUTLINE || neighbours.of(i).len() < all;
     let here = rings((0..body.count()).filter(|&i| is_along(i)), |i| {
         Some(neighbours.of(i).iter().map(|&j| j as usize))
     });
@@ -80,7 +75,8 @@ pub fn along_edges(
         largest = after / size(&moved);
         moved = next.into_iter().map(|v| v.map(|v| v / after)).collect();
     }
-    inside.min(OF_LIMIT * 2.0 / (SAFETY * largest)).min(1.0)
+    // What is no more than inside leaves that as it is.
+    if OF_LIMIT * 2.0 / largest < inside { OF_LIMIT * 2.0 / (SAFETY * largest) } else { inside }
 }
 
 /// The weights of the neighbours of a particle, which are named by their indices in the whole body.

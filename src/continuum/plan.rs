@@ -479,11 +479,9 @@ pub(crate) fn update_of_steps(
     if !is_open {
         return scene.update;
     }
-    let mut materials = scene.material.iter().chain(scene.inclusions.iter().map(|part| &part.material));
-    let shares_means = materials.any(|elastic| elastic.averaged().is_some());
     // A neighbourhood that cannot be listed has been refused.
-    let offsets = shares_means.then(|| scene.neighbourhood.offsets(&body.lattice).ok()).flatten();
-    let all = offsets.and_then(|offsets| offsets.iter().map(Vec::len).max());
+    let offsets = scene.neighbourhood.offsets(&body.lattice).unwrap_or_default();
+    let all = offsets.iter().map(Vec::len).max().unwrap_or(0);
     let turned = if weights.cells.is_some() { OF_TURNED_CELLS } else { 1.0 };
     let over = scene.over_relaxation().max(1.0);
     let along = along_edges(body, neighbours, weights, (damping * over, all), team) / over;

@@ -1,5 +1,7 @@
 //! Roles that particles take on the way, and leaders under their programs.
 
+use std::collections::HashSet;
+
 use serde::{Deserialize, Serialize};
 
 use super::setup::RoleChange;
@@ -122,13 +124,16 @@ impl Engine {
         self.led = self.leaders.iter().map(|led| led.particle).collect();
     }
 
-    /// Puts one component of a change's particles under its motion.
-    pub(super) fn lead_components(&mut self, change: usize, axis: usize) {
-        let RoleChange { particles, motion, .. } = &self.changes[change];
-        if motion.is_some() {
+    /// Puts components of a change's particles, one of them or both, under its motion, if it has one, and under no other.
+    pub(super) fn lead_components(&mut self, change: usize) {
+        let RoleChange { particles, motion, axis, .. } = &self.changes[change];
+        let taken: HashSet<usize> = particles.iter().copied().collect();
+        let is_of = |of: usize| axis.is_none_or(|axis| axis as usize == of);
+        self.led_components.retain(|(led, of)| !is_of(*of) || !taken.contains(&led.particle));
+        if let (Some(_), Some(axis)) = (motion, axis) {
             let base = |particle: usize| self.body.reference.get(particle);
             let led = |(which, &particle): (usize, &usize)| {
-                (Led { particle, change, which, since: 0, base: base(particle) }, axis)
+                (Led { particle, change, which, since: 0, base: base(particle) }, *axis as usize)
             };
             self.led_components.extend(particles.iter().enumerate().map(led));
         }
@@ -137,6 +142,9 @@ impl Engine {
     /// The rule keeps held components where their rest offsets say.
     pub(super) fn move_components(&mut self) {
         for (led, axis) in &self.led_components {
+            if self.roles[led.particle].is_led() {
+                continue;
+            }
             if let Some(place) = led.place(&self.changes, self.step) {
                 self.flock.hold_at(led.particle, *axis, place[*axis]);
             }
@@ -153,6 +161,9 @@ impl Engine {
     /// Puts them there after a step: damping leads a rest offset only part of the way.
     pub(super) fn place_components(&mut self) {
         for (led, axis) in &self.led_components {
+            if self.roles[led.particle].is_led() {
+                continue;
+            }
             if let Some(place) = led.place(&self.changes, self.step) {
                 let component = if *axis == 0 { &mut self.present.x } else { &mut self.present.y };
                 component[led.particle] = place[*axis];

@@ -174,10 +174,10 @@ impl Engine {
         // The plan has given the roles that hold from the start; their motions begin here.
         for change in 0..engine.changes.len() {
             if engine.changes[change].is_at_once() {
-                let all: Vec<usize> = (0..engine.changes[change].particles.len()).collect();
-                match engine.changes[change].axis {
-                    None => engine.start_leading(change, &all, 0),
-                    Some(axis) => engine.lead_components(change, axis as usize),
+                engine.lead_components(change);
+                if engine.changes[change].axis.is_none() {
+                    let all: Vec<usize> = (0..engine.changes[change].particles.len()).collect();
+                    engine.start_leading(change, &all, 0);
                 }
             }
         }

@@ -2,8 +2,10 @@
 
 use std::ops::ControlFlow;
 
+use flockform::continuum::equilibrium::run_to_equilibrium;
 use flockform::continuum::run::{StopReason, run};
 use flockform::flock::role::Role;
+use flockform::flock::vectors::distance;
 use flockform::scene::{Scene, bundled};
 
 use crate::support::*;
@@ -85,6 +87,46 @@ fn a_motion_that_ends_at_the_last_step_there_is_goes_on() {
     );
     let more = format!("{RIGHT} role = 'leader'; from = 5; {last}; [stop]; steps = 30; tolerance = 1e-6");
     assert_eq!(run_out(&pulled([4, 3], 0.0, &more)).engine.step(), 30);
+}
+
+/// The later entry wins, though one of a single component leaves alone what an earlier one holds altogether: stepped or solved.
+#[test]
+fn components_that_entries_share_are_led_as_a_solver_has_them() {
+    let edge = |side: &str, role: &str| {
+        format!("{{ region = {{ kind = \"edge\", side = \"{side}\" }}, role = {role} }}")
+    };
+    let led = |axis: &str, by: &str| {
+        format!(
+            "\"leader\"{axis}, motion = {{ kind = \"keyframes\", frames = [{{ step = 5, displacement = {by} }}] }}"
+        )
+    };
+    let up = edge("bottom", &led(", axis = \"y\"", "[0.0, 0.01]"));
+    let right = "{ region = { kind = \"box\", min = [1.5, -0.1], max = [3.1, 0.1] }, role = \"clamped\", axis = \"y\" }";
+    let held = edge("left", "\"clamped\"");
+    for roles in [
+        [held.clone(), up.clone()].join(", "),
+        [up.clone(), held.clone()].join(", "),
+        [held.clone(), up.clone(), right.to_owned()].join(", "),
+        [edge("left", &led("", "[0.02, 0.0]")), edge("right", "\"clamped\""), up].join(", "),
+    ] {
+        let places = |more: &str| {
+            let text = format!(
+                "title = \"shared\"\nlattice = {{ kind = \"square\", spacing = 1.0 }}\n\
+                 body = {{ shape = {{ kind = \"rectangle\", max = [3.0, 2.0] }} }}\nstop = {{ steps = 2000, tolerance = 1e-13 }}\n\
+                 material = {{ kind = \"isotropic\", young = 1.0, poisson = 0.3 }}\nrule = {{ mean = {{ kind = \"material\" }} }}\n\
+                 roles = [{roles}]\n{more}"
+            );
+            let scene = Scene::parse("shared", "shared.toml", &text, &[], None)
+                .unwrap_or_else(|error| panic!("{error}"));
+            let outcome = run_to_equilibrium(&scene, planned(&scene), &mut |_, _| ControlFlow::Continue(()))
+                .unwrap_or_else(|error| panic!("{error}"));
+            assert_eq!(outcome.reason, StopReason::Equilibrium, "{roles}");
+            outcome.engine.present().clone()
+        };
+        let (stepped, solved) = (places(""), places("equilibrium = {}\n"));
+        let apart = stepped.iter().zip(solved.iter()).map(|(a, b)| distance(a, b)).fold(0.0, f64::max);
+        assert!(apart < 1e-10, "{roles}: {apart}");
+    }
 }
 
 #[test]

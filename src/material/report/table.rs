@@ -213,9 +213,9 @@ impl Waves {
         }
         if let Some(limit) = self.damping_limit {
             let words = if limit < 1.0 - 1e-9 {
-                "an undamped one diverges"
+                "an undamped one diverges, and edges may need less (the default has it)"
             } else {
-                "an undamped one is at worst marginal"
+                "an undamped one is at worst marginal inside, edges may need less (the default has it)"
             };
             row(
                 f,
