@@ -326,12 +326,22 @@ fn cause_in_sweep(engine: &Engine) -> Option<String> {
     if matches!(rule.mean, Mean::Distance { power } if power < FALLS_TOO_FAST) {
         return Some("weights that fall with the distance draw each particle to its nearest neighbour; use a rule.mean.power above -1".into());
     }
-    if matches!(rule.mean, Mean::Distance { power } if power > 0.0) && is_synchronous {
+    if matches!(rule.mean, Mean::Distance { .. })
+        && is_synchronous
+        && damping > rule.mean.settling_damping()
+        && rule.mean.overshoots()
+    {
         return Some("weights that grow with distance let the shortest waves of a synchronous update grow; use update.order = \"sequential\" or a smaller update.damping (`flockform material` computes the limit)".into());
     }
     let are_of_both_signs = matches!(&engine.flock().weights, Weights::Scalar(weights) if weights.iter().any(|weight| *weight < 0.0));
     let are_of_both_signs = engine.count_of_parts(usize::from(are_of_both_signs)) > 0;
-    are_of_both_signs.then(|| "weights of both signs; give weights that are not negative".into())
+    are_of_both_signs.then(|| {
+        let remedy = match is_synchronous && overshoots(engine) {
+            true => "use a smaller update.damping, or update.order = \"sequential\"",
+            false => "give weights that are not negative",
+        };
+        format!("weights of both signs; {remedy}")
+    })
 }
 
 /// Why a sweep grows that has not diverged yet: its moves are each farther than the last, and turn back, or no leader goes on. `None` of
