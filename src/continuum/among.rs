@@ -39,7 +39,7 @@ impl Among<'_> {
         let Self { body, neighbours, team, .. } = *self;
         weights::require_joined(scene, (body, neighbours, weights), Some(team))?;
         self.require_held_together(scene, has_loads, cells)?;
-        *own_update = update(scene, body, neighbours, weights, Some(team));
+        *own_update = update(scene, (body, self.changes), neighbours, weights, Some(team));
         // Those that stand at the ends of a part alone do.
         let is_held = |i: usize| match weights {
             Weights::Matrix(weights) => weights.held(i) != [false; 2],

@@ -16,6 +16,7 @@ pub mod digest;
 pub(crate) mod doubts;
 mod edge_stress;
 pub mod equilibrium;
+mod extrapolation;
 pub(crate) mod late;
 pub mod layout;
 pub mod looks;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::among::{Among, followed, require_loaded};
 use super::damping::along_edges;
+use super::extrapolation;
 use super::layout::Layout;
 use super::layout::refusals::refuse_pieces;
 use super::layout::regions::no_particle;
@@ -30,7 +31,7 @@ use crate::material::mechanism::{self, Mechanism};
 use crate::material::outline_loads::{Load, Resultant, sum};
 use crate::material::weights::WeightsError;
 use crate::ranks::Team;
-use crate::scene::{LoadSteps, Scene, SceneError, Stop};
+use crate::scene::{LoadSteps, Scene, SceneError, Stop, Weights as FixedWeights};
 use crate::solve::linear::HeldComponent;
 use crate::sweep::{Order, Update};
 
@@ -250,7 +251,7 @@ impl Following {
         if let Weights::Matrix(weights) = &mut weights {
             hold_components(weights, &held_components(changes, body, 0.0));
         }
-        let update = update(scene, body, neighbours, &weights, None);
+        let update = update(scene, (body, changes), neighbours, &weights, None);
         Ok(Self { weights, forces, update, loads, free_edge })
     }
 
@@ -453,7 +454,7 @@ const OF_TURNED_CELLS: f64 = 0.75;
 /// The update of a body, which is not asked for where a solver finds it at rest.
 pub(super) fn update(
     scene: &Scene,
-    body: &Body,
+    body: (&Body, &[RoleChange]),
     neighbours: &Neighbours,
     weights: &Weights,
     team: Option<&Team>,
@@ -464,21 +465,27 @@ pub(super) fn update(
     update_of_steps(scene, body, neighbours, weights, team)
 }
 
-/// The update as written; unless its damping is, a material's is what the edges of the body allow, and less where cells turn. Of a part
-/// all ranks find it together.
+/// The update as written; unless its damping is, a material's is what the edges of the body allow, and less where cells turn, and that of
+/// weights that are solved for what those with negative ones allow. Of a part all ranks find it together.
 pub(crate) fn update_of_steps(
     scene: &Scene,
-    body: &Body,
+    (body, changes): (&Body, &[RoleChange]),
     neighbours: &Neighbours,
     weights: &Weights,
     team: Option<&Team>,
 ) -> Update {
     let Update { order, damping } = scene.update;
     let is_open = scene.raw.update.damping.is_none() && order == Order::Synchronous;
-    let Weights::Matrix(weights) = weights else { return scene.update };
     if !is_open {
         return scene.update;
     }
+    if let (Weights::Scalar(weights), Some(FixedWeights::Solved)) = (weights, &scene.weights) {
+        let follows = ever_follow(body, changes);
+        let limit = extrapolation::damping(body, (neighbours, weights), &follows, team);
+        let limit = limit.map_or(damping, |limit| limit / scene.over_relaxation().max(1.0));
+        return Update { order, damping: damping.min(limit) };
+    }
+    let Weights::Matrix(weights) = weights else { return scene.update };
     // A neighbourhood that cannot be listed has been refused.
     let offsets = scene.neighbourhood.offsets(&body.lattice).unwrap_or_default();
     let all = offsets.iter().map(Vec::len).max().unwrap_or(0);

@@ -14,7 +14,7 @@ use crate::flock::fracture::Ghosts;
 use crate::flock::law::Weights;
 use crate::flock::role::Role;
 use crate::flock::rules::{Axis, FeedbackReference, Mean};
-use crate::geometry::point::{dot, minus};
+use crate::geometry::point::{dot, minus, plus};
 use crate::ranks::Team;
 use crate::scene::text::number;
 use crate::scene::{SceneError, Stop};
@@ -326,12 +326,22 @@ fn cause_in_sweep(engine: &Engine) -> Option<String> {
     if matches!(rule.mean, Mean::Distance { power } if power < FALLS_TOO_FAST) {
         return Some("weights that fall with the distance draw each particle to its nearest neighbour; use a rule.mean.power above -1".into());
     }
-    if matches!(rule.mean, Mean::Distance { power } if power > 0.0) && is_synchronous {
+    if matches!(rule.mean, Mean::Distance { .. })
+        && is_synchronous
+        && damping > rule.mean.settling_damping()
+        && rule.mean.overshoots()
+    {
         return Some("weights that grow with distance let the shortest waves of a synchronous update grow; use update.order = \"sequential\" or a smaller update.damping (`flockform material` computes the limit)".into());
     }
     let are_of_both_signs = matches!(&engine.flock().weights, Weights::Scalar(weights) if weights.iter().any(|weight| *weight < 0.0));
     let are_of_both_signs = engine.count_of_parts(usize::from(are_of_both_signs)) > 0;
-    are_of_both_signs.then(|| "weights of both signs; give weights that are not negative".into())
+    are_of_both_signs.then(|| {
+        let remedy = match is_synchronous && overshoots(engine) {
+            true => "use a smaller update.damping, or update.order = \"sequential\"",
+            false => "give weights that are not negative",
+        };
+        format!("weights of both signs; {remedy}")
+    })
 }
 
 /// Why a sweep grows that has not diverged yet: its moves are each farther than the last, and turn back, or no leader goes on. `None` of
@@ -347,6 +357,33 @@ pub(super) fn growth(engine: &Engine) -> Option<String> {
     ((along < 0.0 || !is_led) && next > GROWS * last).then(|| cause_in_sweep(engine)).flatten()
 }
 
+/// The warning about a body that is stepped by a rule without forces and is not at rest yet. `residual` is its largest last move over the
+/// spacing, within `tolerance`. `None` where little is left to go if the moves go on to shrink as they do now.
+pub(crate) fn still_moving(engine: &Engine, residual: f64, tolerance: f64) -> Option<String> {
+    /// Over the spacing \[1\], and over the tolerance.
+    const LITTLE: (f64, f64) = (0.01, 10.0);
+    /// Over the spacing: moves that may be rounding \[1\].
+    const ROUNDING: f64 = 1e-9;
+    if matches!(engine.flock().rule.mean, Mean::Material { .. }) || residual < ROUNDING {
+        return None;
+    }
+    let [along, next, last] = moves(engine);
+    let ratio = (next / last).sqrt();
+    let left = if ratio < 1.0 { residual * ratio / (1.0 - ratio) } else { f64::INFINITY };
+    (along > 0.0 && left > LITTLE.0.max(LITTLE.1 * tolerance)).then(|| {
+        let how = match left.is_finite() {
+            true => format!(
+                "shrink by {:.1e} of themselves a step: about {left:.2} spacings or more are left to go",
+                1.0 - ratio
+            ),
+            false => "do not shrink yet".to_owned(),
+        };
+        format!(
+            "nothing moves farther in a step than stop.tolerance, but the moves {how}; lower stop.tolerance"
+        )
+    })
+}
+
 /// Whether the followers' next moves go against their last ones: waves that grow from step to step change their sign at
 /// each, and outweigh all else in the end.
 fn overshoots(engine: &Engine) -> bool {
@@ -357,9 +394,15 @@ fn overshoots(engine: &Engine) -> bool {
 fn moves(engine: &Engine) -> [f64; 3] {
     let (present, previous, damping) = (engine.present(), engine.previous(), engine.update().damping);
     let followers = engine.body().owned().filter(|&i| engine.roles()[i] == Role::Follower);
-    let products = |i: usize| {
+    // Each sees where those before it are by then.
+    let mut swept = (engine.update().order == Order::Sequential).then(|| present.clone());
+    let mut products = |i: usize| {
         let here = present.get(i);
-        let next = minus(engine.flock().target(i, present), here).map(|x| damping * x);
+        let target = engine.flock().target(i, swept.as_ref().unwrap_or(present));
+        let next = minus(target, here).map(|x| damping * x);
+        if let Some(swept) = &mut swept {
+            swept.set(i, plus(here, next));
+        }
         let last = minus(here, previous.get(i));
         [dot(next, last), dot(next, next), dot(last, last)]
     };

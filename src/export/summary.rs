@@ -17,7 +17,7 @@ use crate::continuum::layout::regions::uneven_sides;
 use crate::continuum::mechanics::{Mechanics, Peak, Stresses, growing, percent};
 use crate::continuum::places::{AtPlace, at_places};
 use crate::continuum::report::{DEVIATES, dead_pressure, whole_cells};
-use crate::continuum::run::{Outcome, StopReason};
+use crate::continuum::run::{Outcome, StopReason, still_moving};
 use crate::engine::Engine;
 use crate::engine::forces::Reaction;
 use crate::flock::body::Cut;
@@ -254,6 +254,9 @@ impl Summary {
                 percent(left)
             )
         });
+        let is_stepped = outcome.reason == StopReason::Equilibrium && outcome.solved.is_none();
+        let tolerance = scene.stop.tolerance.filter(|_| is_stepped);
+        let moving = tolerance.and_then(|tolerance| still_moving(engine, outcome.residual, tolerance));
         Self {
             name: scene.name.clone(),
             title: scene.raw.title.clone(),
@@ -268,8 +271,8 @@ impl Summary {
             share_swept: outcome.solved.is_none().then(|| outcome.engine.activity().share_computed()),
             equilibrium: outcome.solved.as_ref().map(Equilibrium::of),
             energies: Energies { pe1, pe2, largest_strain },
-            is_short_of_rest: balance.is_some() && !is_tied,
-            cautions: [balance, ended_short(scene, outcome)]
+            is_short_of_rest: moving.is_some() || (balance.is_some() && !is_tied),
+            cautions: [balance, moving, ended_short(scene, outcome)]
                 .into_iter()
                 .flatten()
                 .chain(cautions(scene, outcome, measured.as_ref()))

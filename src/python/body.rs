@@ -53,7 +53,8 @@ impl Body {
     /// Takes the update of a body that is stepped.
     fn suit_steps(&mut self) {
         if std::mem::take(&mut self.is_to_be_stepped) {
-            let (body, flock) = (self.engine.body(), self.engine.flock());
+            let (engine, flock) = (&self.engine, self.engine.flock());
+            let body = (engine.body(), engine.changes());
             let update = update_of_steps(&self.scene, body, &flock.neighbours, &flock.weights, None);
             self.engine.set_damping(update.damping);
         }

@@ -125,3 +125,28 @@ fn cuts_that_miss_the_body_are_warned_of_by_the_plan_and_the_run() {
         assert!(others.is_empty(), "{others:?}");
     }
 }
+
+/// A strip of 40 spacings: at 1e-3 its middle has come a seventh of its way.
+#[test]
+fn a_rule_without_forces_that_stops_far_from_rest_is_warned_of() {
+    let folder = temporary();
+    let text = "title = 'strip'\nlattice = { kind = 'square', spacing = 1.0 }\nbody.shape = { kind = 'rectangle', max = [40.0, 2.0] }\n\
+                stop = { steps = 50000, tolerance = 1e-3 }\n\
+                roles = [{ region = { kind = 'edge', side = 'left' }, role = 'clamped' },\n\
+                { region = { kind = 'edge', side = 'right' }, role = 'leader', motion = { kind = 'keyframes', frames = [{ step = 1, \
+                displacement = [0.5, 0.0] }] } }]";
+    std::fs::write(folder.path().join("strip.toml"), text).expect("written");
+    let run = ["run", "strip.toml", "--no-report", "--figures", "none", "--force", "--out", "o"];
+    for order in ["synchronous", "sequential"] {
+        let of = |tolerance: &str| {
+            let (order, tolerance) = (format!("update.order={order}"), format!("stop.tolerance={tolerance}"));
+            done(&[&run[..], &["--set", &order, "--set", &tolerance]].concat(), folder.path())
+        };
+        let short = of("1e-3");
+        let words =
+            ["no move beyond stop.tolerance", "caution: nothing moves farther", "or more are left to go"];
+        assert!(words.iter().all(|words| short.contains(words)), "{order}: {short}");
+        let at_rest = of("1e-7");
+        assert!(at_rest.contains("in equilibrium") && !at_rest.contains("caution"), "{order}: {at_rest}");
+    }
+}

@@ -5,7 +5,7 @@ use flockform::continuum::parts::laid_out_whole_for;
 use super::parts::{
     PLATE, assert_parted_the_same, assert_refused_the_same, assert_scene_parted_the_same, plate,
 };
-use super::scenes::load;
+use super::scenes::{load, planned};
 
 fn set(at: usize, keys: &[&str]) -> String {
     let keys: Vec<String> = keys.iter().map(|key| format!("{key:?}")).collect();
@@ -128,6 +128,16 @@ fn weights_that_are_solved_for_and_second_gradients_in_parts_have_the_bits_of_th
         assert_parted_the_same("tension", &[&small[..], more].concat(), 25);
         assert_parted_the_same("tension", &[&small[..], more, &[fine]].concat(), 25);
     }
+    // Those along a disc extrapolate, so that the update is damped.
+    let disc = "body.shape={kind=\"disc\",radius=9.0}";
+    let hexagonal =
+        ["lattice={kind=\"hexagonal\",spacing=1.0}", "neighbours={kind=\"first\"}", disc, "record.probes=[]"];
+    let roles = "roles=[{region={kind=\"edge\",side=\"left\",depth=0.6},role=\"clamped\"},\
+                 {region={kind=\"edge\",side=\"right\",depth=0.6},role=\"leader\",motion={kind=\"velocity\",per_step=[0.02,0.01]}}]";
+    let extrapolating = [&small[1..], &solved[..1], &hexagonal, &[roles]].concat();
+    let damping = planned(&load("tension", &extrapolating)).setup.update.damping;
+    assert!((0.8..0.9).contains(&damping), "{damping}");
+    assert_parted_the_same("tension", &extrapolating, 25);
     let apart = "body={shape={kind=\"rectangle\",max=[40,9]},holes=[{kind=\"rectangle\",min=[19.5,-1],max=[20.5,10]}]}";
     let scene = load("tension", &[&["record.probes=[]", "frame=\"none\"", apart], &gradient[..]].concat());
     assert_refused_the_same(&scene, "are not connected");

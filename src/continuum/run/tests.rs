@@ -277,7 +277,7 @@ fn a_rule_is_not_blamed_for_a_leader_that_leaves_the_body_behind() {
 #[test]
 fn a_sweep_is_said_to_grow_by_those_terms_alone_that_make_one_grow() {
     let cause = |sets: &[&str]| {
-        let sets = [&["stop.steps=1"], sets].concat();
+        let sets = [&["stop.steps=1", "update.damping=1.0"], sets].concat();
         let outcome = run(plan(&scene("tension", &sets)), &mut |_, _| ControlFlow::Continue(()));
         cause_in_sweep(&outcome.engine)
     };

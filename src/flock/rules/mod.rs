@@ -112,6 +112,26 @@ impl Mean {
         }
     }
 
+    /// The damping with which a synchronous update of it settles \[1\]. Rules with a spacing are stiff, so that it takes half a step; the waves
+    /// of weights by distance grow beyond 2 over `2 (1 + p)` at most, whatever the neighbours.
+    pub(crate) fn settling_damping(&self) -> f64 {
+        match self {
+            Mean::Distance { power } => 1.0 / (1.0 + power.max(1.0)),
+            Mean::Spaced { .. } => 0.5,
+            _ => 1.0,
+        }
+    }
+
+    /// Whether a synchronous update of it may overshoot, so that waves grow or go on for ever: of a mean of these others with weights that do
+    /// not depend on the distance none does.
+    pub(crate) fn overshoots(&self) -> bool {
+        match self {
+            Mean::Distance { power } => *power > 0.0,
+            Mean::Spaced { power, .. } => *power != 0.0,
+            _ => false,
+        }
+    }
+
     /// Whether its targets are affine in the neighbours' positions, by weights that do not change.
     pub(crate) fn is_affine(&self) -> bool {
         matches!(self, Mean::Barycentre | Mean::Material { rotation: Rotation::Small })

@@ -3,6 +3,7 @@
 use super::{Refuse, roles};
 use crate::flock::lattice::Lattice;
 use crate::flock::neighbourhood::Neighbourhood;
+use crate::flock::rules::Mean;
 use crate::material::cells;
 use crate::material::elastic::{Constants, Elastic, ElasticError, Plane};
 use crate::material::gradient::SAFE_DAMPING;
@@ -112,9 +113,15 @@ pub fn is_material(raw: &RawScene) -> bool {
     matches!(raw.rule.mean, Some(RawMean::Material { .. }))
 }
 
-/// The damping as written; unless it is, 1, or what keeps every wave of a material or a second gradient from growing, also
-/// where feedback over-relaxes.
-pub fn damping(raw: &RawScene, lattice: &Lattice, body: Option<&Elastic>, inclusions: &[Inclusion]) -> f64 {
+/// The damping as written; unless it is, 1, or what keeps every wave of a material or a second gradient from growing, and lets a mean that
+/// depends on distances settle, also where feedback over-relaxes.
+pub fn damping(
+    raw: &RawScene,
+    mean: Mean,
+    lattice: &Lattice,
+    body: Option<&Elastic>,
+    inclusions: &[Inclusion],
+) -> f64 {
     let synchronous = raw.update.order == RawOrder::Synchronous;
     let limit = |elastic: &Elastic| {
         Crystal::material(lattice, elastic).ok()?.zone().ok().map(|zone| zone.damping_limit)
@@ -123,6 +130,9 @@ pub fn damping(raw: &RawScene, lattice: &Lattice, body: Option<&Elastic>, inclus
     let of_waves = || {
         if synchronous && matches!(raw.rule.weights, Some(RawWeights::Gradient { .. })) {
             return OF_DAMPING_LIMIT * SAFE_DAMPING / over;
+        }
+        if synchronous && mean.overshoots() {
+            return mean.settling_damping() / over;
         }
         let body = body.filter(|_| is_material(raw) && synchronous);
         let all = body.into_iter().flat_map(|body| {

@@ -150,13 +150,14 @@ pub(super) fn validate(
         .enumerate()
         .map(|(k, entry)| roles::role_entry(&format!("roles[{k}]"), entry, folder, refuse))
         .collect::<Result<_, _>>()?;
+    let mean = mean(raw.rule.mean.as_ref().unwrap_or(&RawMean::Barycentre), spacing, refuse)?;
     Ok(Scene {
         name: name.to_owned(),
         body,
         is_fitted,
         frame: frame(raw.frame),
         neighbourhood,
-        mean: mean(raw.rule.mean.as_ref().unwrap_or(&RawMean::Barycentre), spacing, refuse)?,
+        mean,
         equilibrium,
         load_steps,
         weights: weights(&raw.rule.weights, refuse)?,
@@ -172,7 +173,7 @@ pub(super) fn validate(
         feedback: raw.rule.feedback.as_ref().map(feedback),
         update: Update {
             order: raw.update.order.into(),
-            damping: material::damping(&raw, &lattice, elastic.as_ref(), &inclusions),
+            damping: material::damping(&raw, mean, &lattice, elastic.as_ref(), &inclusions),
         },
         loads: material::loads(&raw.loads, refuse)?,
         material: elastic,

@@ -10,7 +10,7 @@ use crate::flock::law::{Flock, Weights};
 use crate::flock::manoeuvre::{Manoeuvre, Posture};
 use crate::flock::region::Region;
 use crate::flock::role::Role;
-use crate::flock::rules::{Mean, Rule};
+use crate::flock::rules::Rule;
 use crate::flock::vectors::{Vectors, distance};
 use crate::material::cells::Cells;
 use crate::scene::raw::{RawRest, RawWeights};
@@ -81,7 +81,7 @@ fn of_places(swarm: &Swarm, rule: Rule) -> Result<Formation, SceneError> {
         flock.keep_rest();
     }
     let roles = led.iter().map(|lead| if lead.is_some() { Role::Leader } else { Role::Follower }).collect();
-    let update = Update { damping: default_damping(rule), ..Update::default() };
+    let update = Update { damping: rule.mean.settling_damping(), ..Update::default() };
     let setup = Setup { present_radius, ..Setup::new(body, flock, roles, update) };
     let radius = |k: usize| swarm.raw.robots[k].radius.unwrap_or(swarm.raw.radius);
     let mut formation = of_particles(swarm, setup, false);
@@ -89,16 +89,6 @@ fn of_places(swarm: &Swarm, rule: Rule) -> Result<Formation, SceneError> {
     formation.names = names;
     formation.let_lead(led);
     Ok(formation)
-}
-
-/// Rules with a spacing are stiff in a synchronous update: half a step settles. The waves of weights by distance grow beyond
-/// 2 over `2 (1 + p)` at most, whatever the links.
-fn default_damping(rule: Rule) -> f64 {
-    match rule.mean {
-        Mean::Distance { power } => 1.0 / (1.0 + power.max(1.0)),
-        Mean::Spaced { .. } => 0.5,
-        _ => 1.0,
-    }
 }
 
 fn of_body(swarm: &Swarm, scene: &Scene) -> Result<Formation, SceneError> {
@@ -125,7 +115,7 @@ fn of_body(swarm: &Swarm, scene: &Scene) -> Result<Formation, SceneError> {
         });
     }
     let mut setup = Plan::new(&led)?.setup;
-    setup.update.damping = setup.update.damping.min(default_damping(setup.flock.rule));
+    setup.update.damping = setup.update.damping.min(setup.flock.rule.mean.settling_damping());
     let mut formation = of_particles(swarm, setup, false);
     formation.names = names;
     formation.let_lead(members_led);
