@@ -100,11 +100,6 @@ impl Reference {
         Ok(Self { displacement, is_known, solution, spacing })
     }
 
-    /// The finite-element solution itself.
-    pub fn solution(&self) -> &ShapeSolution {
-        &self.solution
-    }
-
     /// The error that the truth states of itself.
     pub fn error(&self) -> EstimatedError {
         self.solution.error()
