@@ -21,14 +21,14 @@ pub fn film<'a>(
     recorder: &'a FlightRecorder,
     colour: FilmColour,
 ) -> Film<'a> {
-    let frames = chosen(recorder.frames().len());
+    let frames = chosen(recorder.frames.kept.len());
     let values = move |frame: usize| match colour {
         FilmColour::Role => None,
         FilmColour::Displacement => {
-            let [dx, dy] = ["dx", "dy"].map(|name| recorder.values(frame, name));
+            let [dx, dy] = ["dx", "dy"].map(|name| recorder.frames.values(frame, name));
             Some(dx?.into_iter().zip(dy?).map(|(x, y)| x.hypot(y)).collect::<Vec<_>>())
         }
-        _ => recorder.values(frame, colour.name()),
+        _ => recorder.frames.values(frame, colour.name()),
     };
     let finite =
         |frame: &usize| values(*frame).unwrap_or_default().into_iter().filter(|value| value.is_finite());
@@ -36,9 +36,9 @@ pub fn film<'a>(
     let range = range.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [f64::min(l, v), f64::max(h, v)]);
     let scale = scale(colour, range);
     let places = move |frame: usize| -> Vectors {
-        let [dx, dy] = ["dx", "dy"].map(|name| recorder.values(frame, name).unwrap_or_default());
+        let [dx, dy] = ["dx", "dy"].map(|name| recorder.frames.values(frame, name).unwrap_or_default());
         let moved = dx.into_iter().zip(dy);
-        recorder.start().iter().zip(moved).map(|([x, y], (dx, dy))| [x + dx, y + dy]).collect()
+        recorder.start.iter().zip(moved).map(|([x, y], (dx, dy))| [x + dx, y + dy]).collect()
     };
     let map = Map::new(swarm, record, report, page::around_in_film);
     let count = frames.len();

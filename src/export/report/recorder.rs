@@ -7,11 +7,11 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::super::bonds::pairs;
+use super::MOST_TEXT;
 use super::encode::GROUP;
 use super::frames::{Channel, Frame, Frames};
 use super::sample::{self, Sample};
 use super::view::{Animation, Clock, Quantity, Stress, View};
-use super::{MOST_TEXT, encoded};
 use crate::continuum::mechanics::Stresses;
 use crate::continuum::memory::{measured, neighbour_entries};
 use crate::continuum::plan::Plan;
@@ -125,16 +125,17 @@ pub(in crate::export) fn packed(scene: &Scene, plan: &Plan, films: bool) -> Pack
 /// Keeps the frames of a run while it goes on.
 #[derive(Debug)]
 pub struct RunRecorder {
-    frames: Frames,
+    pub(in crate::export) frames: Frames,
     first_roles: Vec<Role>,
     roles: Vec<Role>,
     /// Step, particle and role.
     changes: Vec<[u32; 3]>,
-    is_solved: bool,
+    /// Whether the frames are parts of the way to a rest that was solved for.
+    pub(in crate::export) is_solved: bool,
     /// Whether stress on the way is recovered along the outline, which takes longer than a step.
     is_recovered: bool,
     /// The particles that are shown of a body in parts.
-    sample: Option<Sample>,
+    pub(in crate::export) sample: Option<Sample>,
 }
 
 impl RunRecorder {
@@ -195,8 +196,8 @@ impl RunRecorder {
     /// The frames and rows so far.
     pub fn animation_state(&self) -> AnimationState<'_> {
         AnimationState {
-            frames: Cow::Borrowed(self.frames.kept()),
-            interval: self.frames.interval(),
+            frames: Cow::Borrowed(&self.frames.kept),
+            interval: self.frames.interval,
             first_roles: self.first_roles.clone(),
             roles: self.roles.clone(),
             changes: self.changes.clone(),
@@ -206,7 +207,7 @@ impl RunRecorder {
 
     /// Of so many particles along either axis of the lattice of a body in parts one is shown.
     fn stride(&self) -> Option<usize> {
-        self.sample.as_ref().map(Sample::stride)
+        self.sample.as_ref().map(|sample| sample.stride)
     }
 
     /// The next step after `step` of which a frame is kept.
@@ -282,29 +283,9 @@ impl RunRecorder {
         self.sample.is_none() && self.frames.count <= MOST_EXACT
     }
 
-    /// The particles that are shown, of a body in parts.
-    pub(in crate::export) fn sample(&self) -> Option<&Sample> {
-        self.sample.as_ref()
-    }
-
-    /// A quantity of every particle in a frame, where it is kept.
-    pub(in crate::export) fn values(&self, frame: usize, quantity: &str) -> Option<Vec<f64>> {
-        let channel = self.frames.channels.iter().position(|channel| channel.name == quantity)?;
-        Some(self.frames.kept()[frame].tracks[channel].values())
-    }
-
     /// Whether frames hold a quantity of every particle.
     pub(in crate::export) fn keeps(&self, quantity: &str) -> bool {
         self.frames.channels.iter().any(|channel| channel.name == quantity)
-    }
-
-    pub(in crate::export) fn frames(&self) -> &[Frame] {
-        self.frames.kept()
-    }
-
-    /// Whether the frames are parts of the way to a rest that was solved for.
-    pub(in crate::export) fn is_solved(&self) -> bool {
-        self.is_solved
     }
 
     /// The part of the load at a frame, if frames are parts of it.
@@ -348,7 +329,7 @@ impl RunRecorder {
             stage.set_reference(&sample.reference);
             stage.set_ids(sample.ids.iter().copied());
             // A dot stands for those around it as well.
-            stage.animation.spacing *= sample.stride() as f64;
+            stage.animation.spacing *= sample.stride as f64;
         } else {
             stage.set_reference(&engine.body().reference);
             if let Some(numbering) = &engine.body().numbering {
@@ -367,13 +348,9 @@ impl RunRecorder {
         if is_exact {
             add_exact(&mut stage, scene, engine);
         }
-        let encoded = encoded(&mut self.frames, stage.size());
-        let steps = self.frames.kept().iter().map(|frame| frame.step as f64);
-        let times = match is_solved {
-            true => steps.map(|step| 100.0 * step / LOAD_FRAMES as f64).collect(),
-            false => steps.collect(),
-        };
-        stage.set_frames(&self.frames, encoded, times);
+        let percent = |step: usize| 100.0 * step as f64 / LOAD_FRAMES as f64;
+        let clock = |step: usize| if is_solved { percent(step) } else { step as f64 };
+        stage.set_frames(&mut self.frames, clock);
         stage
     }
 }
