@@ -75,7 +75,7 @@ impl OutlineMesh {
         let curves = Curves::new(outline, request.lines, request.places, request.points);
         // Equilateral triangles of side a have the area 0.433 a^2.
         let size = (outline.area() / (0.433 * request.cells as f64)).sqrt();
-        let triangles = triangulate(&curves, size, MOST_VERTICES)?;
+        let triangles = triangulate(&curves, size)?;
         let graded = curves.junctions.iter().zip(&triangles.junctions).filter(|(j, _)| j.grading > 0.0);
         let singular = graded.map(|(junction, &node)| (node as u32, junction.grading)).collect();
         let stretches =
@@ -181,9 +181,6 @@ impl OutlineMesh {
         Ok(OutlineMesh { mesh, curves, stretches, singular, sides })
     }
 }
-
-/// More vertices than this are not put into a mesh of level 0.
-const MOST_VERTICES: usize = 200_000;
 
 /// The size at distance r is r^grading, so n times smaller cells begin n^(1 / (1 - grading)) times nearer.
 fn first_part(grading: f64) -> f64 {
