@@ -5,11 +5,12 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-use super::{Film, FilmColour, FilmError, Scale, chosen};
+use super::{Film, FilmColour, FilmError, chosen};
 use crate::continuum::mechanics::Stresses;
 use crate::continuum::record::Snapshot;
 use crate::continuum::run::Outcome;
 use crate::engine::Engine;
+use crate::export::figures::bands::{Bands, Field};
 use crate::export::figures::configuration::{Setting, configuration_in};
 use crate::export::figures::{Subject, displaced, page};
 use crate::export::largest_strain;
@@ -56,15 +57,15 @@ pub fn film<'a>(
         let (snapshot, values) = (shown.snapshot(frame), shown.values(frame));
         setting.include(&subject, &snapshot, values.as_deref());
     }
-    let scale = shown.scale(&setting);
+    let bands = shown.bands(&setting);
     for &frame in &frames {
-        setting.reserve(&subject, shown.note(&subject, frame), scale.as_ref().map(|scale| &scale.bands));
+        setting.reserve(&subject, shown.note(&subject, frame), bands.as_ref());
     }
     let count = frames.len();
     let draw = move |n: usize| {
         let frame = frames[n];
         let (snapshot, values) = (shown.snapshot(frame), shown.values(frame));
-        let field = scale.as_ref().zip(values.as_deref()).map(|(scale, values)| scale.field(values));
+        let field = bands.as_ref().zip(values.as_deref()).map(|(bands, values)| Field { bands, values });
         let subject = shown.subject();
         let note = shown.note(&subject, frame);
         configuration_in(&setting, &subject, &snapshot, note, field.as_ref())
@@ -239,7 +240,8 @@ impl<'a> Shown<'a> {
         found.map_or_else(|| vec![f64::NAN; displacement.len()], |found| von_mises(Some(found)))
     }
 
-    fn scale(&self, setting: &Setting) -> Option<Scale<'static>> {
+    /// Bands for the values of all frames.
+    fn bands(&self, setting: &Setting) -> Option<Bands> {
         let (unit, spacing) = (self.scene.unit(), self.engine.body().lattice.spacing());
         let (quantity, unit, noise) = match self.colour {
             FilmColour::Displacement => ("displacement", unit.to_owned(), NOISE * spacing),
@@ -249,7 +251,7 @@ impl<'a> Shown<'a> {
             FilmColour::VonMises => ("von Mises stress", Units::of(self.scene).stress, 0.0),
             _ => return None,
         };
-        Some(Scale { quantity, unit, bands: setting.bands(noise) })
+        Some(setting.bands(noise).named(quantity, unit))
     }
 }
 
