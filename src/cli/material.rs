@@ -131,7 +131,7 @@ pub fn wrong(option: &'static str, message: impl Into<String>, help: impl Into<S
 pub fn answer(arguments: &MaterialArguments) -> Result<String, Refusal> {
     let report = match &arguments.scene {
         Some(scene) => {
-            let scene = SceneArguments::new(scene, &arguments.overrides.set).load([])?;
+            let scene = SceneArguments::new(scene, &arguments.overrides.set).load()?;
             bulk_response::material(&scene)?
         }
         None => {
