@@ -101,13 +101,12 @@ mod tests {
     use std::ops::ControlFlow;
 
     use super::super::frames::Frame;
-    use super::super::recorder::{AnimationState, LOAD_FRAMES, RunRecorder};
+    use super::super::recorder::{AnimationState, LOAD_FRAMES, RunRecorder, von_mises};
     use super::*;
     use crate::continuum::equilibrium::{run_to_equilibrium_shared, run_to_equilibrium_watched};
     use crate::continuum::mechanics::Stresses;
     use crate::continuum::plan::Plan;
     use crate::engine::observer::EachStep;
-    use crate::material::stress::StressState;
     use crate::ranks::in_process;
     use crate::scene::Scene;
     use crate::scene::bundled::bundled;
@@ -179,10 +178,7 @@ mod tests {
         };
         let plan = Plan::new(scene).expect("can be laid out");
         let end = run_to_equilibrium_watched(scene, plan, &mut EachStep(&mut see)).expect("an end").engine;
-        let size = |stress: &Option<StressState>| stress.map_or(f64::NAN, |stress| stress.von_mises);
-        let recovered = Stresses::at_present(&end)
-            .map_or_else(Vec::new, |stresses| stresses.particles.iter().map(size).collect());
-        seen.insert(END, (end.displacements(), recovered));
+        seen.insert(END, (end.displacements(), von_mises(Stresses::at_present(&end))));
         seen
     }
 
