@@ -117,16 +117,16 @@ fn on_particles(compared: &Compared, of_cells: &[f64]) -> Vec<f64> {
     (0..count).map(mean).collect()
 }
 
-fn facts(scene: &Scene, report: &ComparisonReport) -> Vec<(String, String)> {
+fn facts(scene: &Scene, report: &ComparisonReport) -> Vec<(&'static str, String)> {
     let rule = &report.rule;
     let way = match (rule.solver, rule.iterations) {
         (Some(solver), Some(iterations)) => format!("{solver}, {}", counted(iterations, "iteration")),
         _ => counted(rule.steps, "step"),
     };
     vec![
-        ("Rule".into(), format!("by {way}: {}", rule.stop_reason)),
+        ("Rule", format!("by {way}: {}", rule.stop_reason)),
         (
-            "Reference".into(),
+            "Reference",
             match report.truth.stated_error {
                 Some(error) => format!(
                     "finite elements on the shape, {} nodes, own error {} %",
@@ -137,7 +137,7 @@ fn facts(scene: &Scene, report: &ComparisonReport) -> Vec<(String, String)> {
             },
         ),
         (
-            "Compared".into(),
+            "Compared",
             format!(
                 "{} followers, {} cells, lengths in {}",
                 report.comparison.followers,

@@ -268,11 +268,10 @@ fn note(animation: &Animation, report: &FlightReport) -> String {
     )
 }
 
-fn facts(report: &FlightReport) -> Vec<(String, String)> {
+fn facts(report: &FlightReport) -> Vec<(&'static str, String)> {
     let robots = format!("{} ({}), {} of them lead", report.robots, report.model, report.leaders);
     let first = [("Robots", robots), ("Flown", format!("{} s", number(report.seconds)))];
-    let facts = first.into_iter().chain(report.facts(number));
-    facts.map(|(name, value)| (name.to_owned(), value)).collect()
+    first.into_iter().chain(report.facts(number)).collect()
 }
 
 fn tables(report: &FlightReport) -> Vec<Table> {
