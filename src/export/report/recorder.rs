@@ -216,9 +216,9 @@ impl RunRecorder {
     }
 
     /// The frame of the end, which is exact whatever its step; of a body that was solved for at once, the way there.
-    fn finish(&mut self, scene: &Scene, engine: &Engine, is_solved: bool) {
+    fn finish(&mut self, scene: &Scene, engine: &Engine) {
         let at_end = || von_mises(Stresses::at_present(engine));
-        if is_solved {
+        if self.is_solved {
             let mut channels = self.frames.channels.clone();
             // Of an even load the page has as many parts of what it knows exactly.
             if is_linear(scene) && self.is_exact() {
@@ -270,12 +270,12 @@ impl RunRecorder {
     /// Takes the frames of the end, after which there are no others.
     pub fn close(&mut self, scene: &Scene, outcome: &Outcome) {
         self.is_solved = is_solved_at_once(scene, outcome);
-        self.finish(scene, &outcome.engine, self.is_solved);
+        self.finish(scene, &outcome.engine);
     }
 
     /// The animation of a run that is closed, for the rank that writes; of frames that are too many for a page half are let go.
     pub fn stage(&mut self, scene: &Scene, outcome: &Outcome) -> View {
-        self.view(scene, &outcome.engine, self.is_solved, self.is_exact())
+        self.view(scene, &outcome.engine, self.is_exact())
     }
 
     /// Whether the page has the final values exactly.
@@ -307,11 +307,12 @@ impl RunRecorder {
     #[cfg(feature = "live")]
     pub(crate) fn still(scene: &Scene, engine: &Engine) -> View {
         let mut recorder = Self::new(scene, engine, false);
-        recorder.finish(scene, engine, false);
-        recorder.view(scene, engine, false, false)
+        recorder.finish(scene, engine);
+        recorder.view(scene, engine, false)
     }
 
-    fn view(&mut self, scene: &Scene, engine: &Engine, is_solved: bool, is_exact: bool) -> View {
+    fn view(&mut self, scene: &Scene, engine: &Engine, is_exact: bool) -> View {
+        let is_solved = self.is_solved;
         let mut stage = View::new(animation(scene, engine, is_solved));
         // Stress before the last frame is kept, a part of what is exact, or computed by the page.
         let is_even = is_solved && is_exact && is_linear(scene);
