@@ -3,35 +3,31 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use flockform::scene::Bundled;
 use serde_json::{Value, json};
 
 use super::names::{FileName, Kind, bundled_file};
 use super::{Refusal, print, say};
 
-/// The kinds of file that `list` lists.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Listed {
-    Scenes,
-    Swarms,
-}
-
 #[derive(Debug, Args)]
 pub struct ListArguments {
     /// Kind of file to list
-    what: Listed,
+    #[arg(value_parser = PossibleValuesParser::new(["scenes", "swarms"]).map(listed))]
+    what: Kind,
     /// Print JSON: name and title of each
     #[arg(long)]
     json: bool,
 }
 
+fn listed(name: String) -> Kind {
+    if name == "scenes" { Kind::Scene } else { Kind::Swarm }
+}
+
 /// Lists bundled files, one a line.
 pub fn list(arguments: &ListArguments) -> Result<(), Refusal> {
-    let kind = match arguments.what {
-        Listed::Scenes => Kind::Scene,
-        Listed::Swarms => Kind::Swarm,
-    };
+    let kind = arguments.what;
     let all = kind.bundled();
     let title = |one: &Bundled| kind.described(one).map(|[title, _]| title);
     let titles: Vec<String> = all.iter().map(title).collect::<Result<_, _>>()?;

@@ -37,8 +37,7 @@ fn part_of_one(text: &str) -> Result<f64, String> {
 /// Compares a scene's rule with its truth, prints the measures and writes what comes of it.
 pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
     let open = &arguments.study.scene;
-    let Chosen { scene, words: chosen, .. } =
-        choose(open.load(None)?, &|more: &[String]| open.load_scene(more))?;
+    let Chosen { scene, words: chosen, .. } = choose(open.load()?, &|more: &[String]| open.load_scene(more))?;
     let folder = arguments.study.output.folder(&format!("{}-compare", scene.name))?;
     let effort = Effort { target: arguments.truth_error, ..Effort::default() };
     let progress = Progress::of_steps(arguments.study.output.quiet, scene.stop.steps);

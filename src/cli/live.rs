@@ -143,7 +143,7 @@ impl LiveArguments {
         let (file, set, folder) = (&self.file, &self.overrides.set, folder_of(&self.file));
         Ok(match Kind::of_either(file)? {
             Kind::Scene => {
-                let scene = SceneArguments::new(file, set).load([])?;
+                let scene = SceneArguments::new(file, set).load()?;
                 Box::new(Body::new(scene, folder)?)
             }
             Kind::Swarm => {

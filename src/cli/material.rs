@@ -98,7 +98,7 @@ struct ConstantArguments {
     fiber_angle: Option<f64>,
     /// Assumption across the thickness [default: stress]
     #[arg(long, requires = "young", conflicts_with = "shear")]
-    plane: Option<PlaneName>,
+    plane: Option<Plane>,
     /// Thickness of the sheet [default: 1]
     #[arg(long, value_name = "T", requires = "young", allow_negative_numbers = true)]
     thickness: Option<f64>,
@@ -112,14 +112,6 @@ enum KindName {
     Hexagonal,
     Oblique,
     Honeycomb,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum PlaneName {
-    /// A thin sheet with free faces
-    Stress,
-    /// A slice of a long body
-    Strain,
 }
 
 /// A wrong option: the fault and the remedy.
@@ -139,7 +131,7 @@ pub fn wrong(option: &'static str, message: impl Into<String>, help: impl Into<S
 pub fn answer(arguments: &MaterialArguments) -> Result<String, Refusal> {
     let report = match &arguments.scene {
         Some(scene) => {
-            let scene = SceneArguments::new(scene, &arguments.overrides.set).load([])?;
+            let scene = SceneArguments::new(scene, &arguments.overrides.set).load()?;
             bulk_response::material(&scene)?
         }
         None => {
@@ -281,8 +273,7 @@ impl ConstantArguments {
         let Some(poisson) = self.poisson else { return Ok(None) };
         let constants = match (self.young.as_slice(), self.shear) {
             (&[young], None) => {
-                let plane = if self.plane == Some(PlaneName::Strain) { Plane::Strain } else { Plane::Stress };
-                Constants::Isotropic { young, poisson, plane }
+                Constants::Isotropic { young, poisson, plane: self.plane.unwrap_or(Plane::Stress) }
             }
             (&[along, across], Some(shear)) => {
                 let angle = self.fiber_angle.unwrap_or(0.0).to_radians();

@@ -211,17 +211,17 @@ impl SceneArguments {
         Self { scene: scene.to_owned(), overrides: Overrides { set: set.to_vec() } }
     }
 
-    pub fn load(&self, more: impl IntoIterator<Item = String>) -> Result<Scene, Refusal> {
-        self.load_part(&more.into_iter().collect::<Vec<_>>(), |_| 1)
+    pub fn load(&self) -> Result<Scene, Refusal> {
+        self.load_part(|_| 1)
     }
 
     /// The same for a process that has one of so many parts of the body.
-    pub fn load_part(&self, more: &[String], parts: impl Fn(&Scene) -> usize) -> Result<Scene, Refusal> {
+    pub fn load_part(&self, parts: impl Fn(&Scene) -> usize) -> Result<Scene, Refusal> {
         if bundled(&self.scene).is_none() {
             Kind::Scene.path(&self.scene)?;
         }
         let refuse = |error: SceneError| Kind::Scene.refuse_other(&self.scene).unwrap_or(error.into());
-        let scene = self.load_scene(more).map_err(refuse)?;
+        let scene = self.load_scene(&[]).map_err(refuse)?;
         memory::require(&scene, at_least(&scene) / parts(&scene) as f64)?;
         Ok(scene)
     }

@@ -116,16 +116,14 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
             // Of what strangers send, and not of what the file takes to be read.
             bound_opening();
             let left: Option<Left> = life.left();
-            let page = arguments
-                .live
-                .then(|| LivePage::open(arguments, life.number(), left.as_ref()))
-                .transpose()?;
+            let page =
+                arguments.live.then(|| LivePage::open(arguments, life.number, left.as_ref())).transpose()?;
             let mut node = FormationNode::open(&swarm, ros, name).map_err(|error| refused(&swarm, error))?;
             let (member, namespace) = (arguments.member.clone(), Some(node.fleet().to_owned()));
             let mut about = About { member, namespace, ..file.about("node", &swarm) };
             about.set.extend(node.overrides(&swarm));
             about.taken_over = left.as_ref().map(|left| left.node.control().clone());
-            let recording = arguments.record.open(&about, false, life.number())?;
+            let recording = arguments.record.open(&about, false, life.number)?;
             if let Some(recording) = &recording {
                 node.record(recording.sink()).map_err(NodeError::from)?;
             }

@@ -50,7 +50,7 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
         Kind::Scene => {
             let count = ranks.map_or(1, usize::from);
             let parts = |scene: &Scene| if laid_out_whole_for(scene).is_none() { count } else { 1 };
-            let scene = SceneArguments::new(file, set).load_part(&[], parts)?;
+            let scene = SceneArguments::new(file, set).load_part(parts)?;
             let parts = PartShares::new(&scene, count)?;
             let of_parts = parts.map(|parts| {
                 let are_drawn = is_raster(parts.total());

@@ -112,7 +112,7 @@ impl Prepared {
         let words_of = SceneArguments::new(&asked.scene, &asked.set);
         let may_be_parted = |scene: &Scene| team.is_some() && laid_out_whole_for(scene).is_none();
         let parts = |scene: &Scene| if may_be_parted(scene) { team.map_or(1, Team::count) } else { 1 };
-        let scene = words_of.load_part(&[], parts)?;
+        let scene = words_of.load_part(parts)?;
         if let (Some(team), true) = (team, may_be_parted(&scene)) {
             // What follows all ranks do together.
             begin.agree(arguments.common(&scene))?;

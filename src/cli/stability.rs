@@ -30,7 +30,7 @@ pub fn stability(arguments: &StabilityArguments) -> Result<ExitCode, Refusal> {
     let effort = if arguments.quick { Effort::quick() } else { Effort::default() };
     let options = Options { effort, no_extremes: arguments.no_extremes };
     // Before a folder is made: a misspelt name, a body that cannot be.
-    let scene = arguments.study.scene.load([])?;
+    let scene = arguments.study.scene.load()?;
     plan(&scene)?;
     let name = scene.name;
     let folder = arguments.study.output.folder(&format!("{name}-stability"))?;

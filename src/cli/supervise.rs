@@ -49,7 +49,8 @@ const REST: Duration = Duration::from_secs(1);
 
 /// A child's end of its socket.
 pub struct Life {
-    number: u32,
+    /// From 1.
+    pub number: u32,
     socket: Option<UnixStream>,
     /// The text of the file when the first process began, where there is one.
     pub text: Option<String>,
@@ -215,11 +216,6 @@ impl Life {
             (None, Value::Null)
         });
         Ok(Self { number, socket: Some(socket), text, left, unsent: Vec::new(), sent: None })
-    }
-
-    /// From 1.
-    pub fn number(&self) -> u32 {
-        self.number
     }
 
     /// The last state that the previous process sent.

@@ -133,7 +133,7 @@ struct Sweep {
 impl Sweep {
     /// Lays out what is asked for; the usual outputs where none are named.
     fn new(mut request: SweepRequest, rows: BTreeMap<usize, Row>) -> Result<Self, Refusal> {
-        let scene = scene_arguments(&request).load([])?;
+        let scene = scene_arguments(&request).load()?;
         if request.outputs.is_empty() {
             request.outputs = Output::usual(&scene);
         }

@@ -35,7 +35,7 @@ pub fn trade(arguments: &TradeArguments) -> Result<ExitCode, Refusal> {
         ..usual
     };
     // Asked for first, so that a misspelt name is a misspelt name.
-    let name = arguments.study.scene.load([])?.name;
+    let name = arguments.study.scene.load()?.name;
     let folder = arguments.study.output.folder(&format!("{name}-trade"))?;
     let load = |more: &[String]| arguments.study.scene.load_scene(more);
     let progress = Progress::of_stages(arguments.study.output.quiet);

@@ -8,7 +8,7 @@
 //! Numbers are the shortest that read back as the same.
 
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use super::OutputFolder;
 use super::error::ExportError;
-use super::manifest::create;
+use super::manifest::{create, create_buffered};
 use crate::continuum::record::ProbeSeries;
 use crate::engine::Engine;
 use crate::flock::body::Body;
@@ -100,8 +100,7 @@ pub(super) fn write_final(
         return Ok(None);
     };
     let path = folder.path("final.csv");
-    let mut file = create(&path).and_then(|file| {
-        let mut file = BufWriter::new(file);
+    let mut file = create_buffered(&path).and_then(|mut file| {
         file.write_all(&header).and_then(|()| rows.write(before, &mut file)).map(|()| file)
     });
     // What the others send is received in any case: they wait until it is.

@@ -173,8 +173,8 @@ impl OutputFolder {
                 let moved = rename(partial, out);
                 if moved.is_err() {
                     rename(&aside, out)?;
-                } else if let Err(error) = remove(&aside) {
-                    tracing::warn!("former outputs are left in {}: {error}", aside.display());
+                } else {
+                    remove_former(&aside);
                 }
                 moved
             }
@@ -340,14 +340,17 @@ fn discard(partial: &Path) -> Result<(), ExportError> {
 fn put_back(out: &Path) -> Result<(), ExportError> {
     let aside = beside(out, "replaced", 0);
     match Ours::in_folder(&aside).is_ok() {
-        true if !out.exists() => rename(&aside, out),
-        true => {
-            if let Err(error) = remove(&aside) {
-                tracing::warn!("former outputs are left in {}: {error}", aside.display());
-            }
-            Ok(())
-        }
-        false => Ok(()),
+        true if !out.exists() => return rename(&aside, out),
+        true => remove_former(&aside),
+        false => {}
+    }
+    Ok(())
+}
+
+/// Removes outputs that were replaced; those that cannot be removed are no reason to end.
+fn remove_former(aside: &Path) {
+    if let Err(error) = remove(aside) {
+        tracing::warn!("former outputs are left in {}: {error}", aside.display());
     }
 }
 

@@ -23,6 +23,8 @@ const FLAT: f64 = 1.25;
 const BULGE: f64 = 0.15;
 /// Passes over all triangles; twenty are usual.
 const MOST_PASSES: usize = 200;
+/// More vertices than this are not put into a mesh.
+const MOST_VERTICES: usize = 200_000;
 
 /// A vertex: where it is, in the body's coordinates and in those of the triangulation, which have size 1.
 #[derive(Debug, Clone, Copy)]
@@ -67,7 +69,6 @@ struct Mesher<'c> {
     junctions: Vec<usize>,
     origin: Point,
     most: f64,
-    most_vertices: usize,
 }
 
 /// The defect of a triangle.
@@ -83,7 +84,7 @@ enum Flaw {
 ///
 /// # Errors
 /// [`FemError::Unmeshable`] where two curves come closer than the triangulation can follow.
-pub(crate) fn triangulate(curves: &Curves, most: f64, most_vertices: usize) -> Result<Triangles, FemError> {
+pub(crate) fn triangulate(curves: &Curves, most: f64) -> Result<Triangles, FemError> {
     let origin = curves.junctions.first().map_or([0.0; 2], |junction| junction.at);
     let mut mesher = Mesher {
         curves,
@@ -93,7 +94,6 @@ pub(crate) fn triangulate(curves: &Curves, most: f64, most_vertices: usize) -> R
         junctions: Vec::new(),
         origin,
         most,
-        most_vertices,
     };
     mesher.follow_curves()?;
     mesher.refine()?;
@@ -192,7 +192,7 @@ impl Mesher<'_> {
             }
             flawed.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
             for (_, triangle) in flawed {
-                if self.cdt.num_vertices() >= self.most_vertices {
+                if self.cdt.num_vertices() >= MOST_VERTICES {
                     return Ok(());
                 }
                 if self.exists(triangle) {

@@ -51,13 +51,15 @@ pub struct OutlineSide {
 /// A mesh of a shape, which knows which side of which cell is which part of the outline.
 #[derive(Debug, Clone)]
 pub struct OutlineMesh {
-    mesh: Mesh,
+    /// The cells and nodes.
+    pub mesh: Mesh,
     curves: Vec<Curve>,
     /// Sides of cells on curves, by their end nodes in the direction of the curve.
     stretches: HashMap<[u32; 2], Stretch>,
     /// Gradings of singular nodes.
     singular: HashMap<u32, f64>,
-    sides: Vec<OutlineSide>,
+    /// The sides of cells on the outline, in the order of cells.
+    pub sides: Vec<OutlineSide>,
 }
 
 impl OutlineMesh {
@@ -73,7 +75,7 @@ impl OutlineMesh {
         let curves = Curves::new(outline, request.lines, request.places, request.points);
         // Equilateral triangles of side a have the area 0.433 a^2.
         let size = (outline.area() / (0.433 * request.cells as f64)).sqrt();
-        let triangles = triangulate(&curves, size, MOST_VERTICES)?;
+        let triangles = triangulate(&curves, size)?;
         let graded = curves.junctions.iter().zip(&triangles.junctions).filter(|(j, _)| j.grading > 0.0);
         let singular = graded.map(|(junction, &node)| (node as u32, junction.grading)).collect();
         let stretches =
@@ -178,20 +180,7 @@ impl OutlineMesh {
         let mesh = Mesh::new(x, y, cells)?;
         Ok(OutlineMesh { mesh, curves, stretches, singular, sides })
     }
-
-    /// The cells and nodes.
-    pub fn mesh(&self) -> &Mesh {
-        &self.mesh
-    }
-
-    /// The sides of cells on the outline, in the order of cells.
-    pub fn sides(&self) -> &[OutlineSide] {
-        &self.sides
-    }
 }
-
-/// More vertices than this are not put into a mesh of level 0.
-const MOST_VERTICES: usize = 200_000;
 
 /// The size at distance r is r^grading, so n times smaller cells begin n^(1 / (1 - grading)) times nearer.
 fn first_part(grading: f64) -> f64 {
@@ -259,18 +248,18 @@ mod tests {
             let outline = Outline::of_shape(&shape).unwrap();
             let request = MeshRequest { cells: 200, ..MeshRequest::default() };
             let mut mesh = OutlineMesh::new(&outline, &request).unwrap_or_else(|e| panic!("{shape:?}: {e}"));
-            assert!(sharpest(mesh.mesh()) > least, "{shape:?}: {}", sharpest(mesh.mesh()));
+            assert!(sharpest(&mesh.mesh) > least, "{shape:?}: {}", sharpest(&mesh.mesh));
             let mut off = Vec::new();
             for level in 0..2 {
                 let length: f64 = mesh
-                    .sides()
+                    .sides
                     .iter()
                     .map(|s| (s.t[1] - s.t[0]) * outline.piece(s.ring, s.piece).length())
                     .sum();
                 assert!((length / outline.length() - 1.0).abs() < 1e-12, "{shape:?} {level}: {length}");
-                assert_eq!(mesh.sides().len(), mesh.mesh().boundary().len(), "{shape:?}");
-                off.push((area(mesh.mesh()) / outline.area() - 1.0).abs());
-                assert!(mesh.mesh().cell_count() < 9000, "{shape:?}: {}", mesh.mesh().cell_count());
+                assert_eq!(mesh.sides.len(), mesh.mesh.boundary().len(), "{shape:?}");
+                off.push((area(&mesh.mesh) / outline.area() - 1.0).abs());
+                assert!(mesh.mesh.cell_count() < 9000, "{shape:?}: {}", mesh.mesh.cell_count());
                 mesh = mesh.refined().unwrap_or_else(|e| panic!("{shape:?}: {e}"));
             }
             assert!(off[0] < 1e-5, "{shape:?}: area off by {off:?}");
@@ -288,14 +277,14 @@ mod tests {
         let request =
             MeshRequest { lines: &[circle, across], places: &[(place, 0.75)], points: &points, cells: 300 };
         let mesh = OutlineMesh::new(&outline, &request).unwrap().refined().unwrap();
-        let nodes = |inside: &dyn Fn(f64, f64) -> bool| mesh.mesh().nodes_where(inside).len();
+        let nodes = |inside: &dyn Fn(f64, f64) -> bool| mesh.mesh.nodes_where(inside).len();
         for p in [[33.3, 7.7], [40.0, 3.0], [40.0, 12.0]] {
             assert_eq!(nodes(&|x, y| x == p[0] && (y - p[1]).abs() < 1e-12), 1, "{p:?}");
         }
         assert!(nodes(&|_, y| (y - 30.0).abs() < 1e-9) > 20);
         assert!(nodes(&|x, y| ((x - 8.0).hypot(y - 8.0) - 5.0).abs() < 1e-9) > 20);
-        let crossed = (0..mesh.mesh().cell_count()).any(|cell| {
-            let y = mesh.mesh().positions(cell)[..3].iter().map(|p| p[1] - 30.0).collect::<Vec<_>>();
+        let crossed = (0..mesh.mesh.cell_count()).any(|cell| {
+            let y = mesh.mesh.positions(cell)[..3].iter().map(|p| p[1] - 30.0).collect::<Vec<_>>();
             y.iter().any(|&d| d > 1e-9) && y.iter().any(|&d| d < -1e-9)
         });
         assert!(!crossed, "no cell is on both sides of a line");
@@ -306,6 +295,6 @@ mod tests {
         let outline = Outline::of_shape(&shapes()[5].0).unwrap();
         let request = MeshRequest { cells: 300, ..MeshRequest::default() };
         let [a, b] = [0, 1].map(|_| OutlineMesh::new(&outline, &request).unwrap().refined().unwrap());
-        assert!(a.mesh() == b.mesh() && a.sides() == b.sides());
+        assert!(a.mesh == b.mesh && a.sides == b.sides);
     }
 }

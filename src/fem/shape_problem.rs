@@ -209,9 +209,9 @@ impl<'a> ShapeProblem<'a> {
     /// [`FemError::EmptySupport`] for a support that holds no node, [`FemError::OutsideMesh`] for a point force
     /// or a held point outside the body.
     pub(crate) fn on_mesh(&self, mesh: &OutlineMesh) -> Result<(Problem, Holders), FemError> {
-        let mut problem = Problem::new(mesh.mesh().clone(), self.material);
-        problem.inclusions = self.inclusions_on(mesh.mesh());
-        let mut holder = vec![[None; 2]; mesh.mesh().node_count()];
+        let mut problem = Problem::new(mesh.mesh.clone(), self.material);
+        problem.inclusions = self.inclusions_on(&mesh.mesh);
+        let mut holder = vec![[None; 2]; mesh.mesh.node_count()];
         for (number, support) in self.supports.iter().enumerate() {
             let nodes = self.nodes(number, &support.on, mesh)?;
             if nodes.is_empty() {
@@ -224,21 +224,21 @@ impl<'a> ShapeProblem<'a> {
             }
         }
         for (node, holders) in holder.iter().enumerate() {
-            let at = [mesh.mesh().x()[node], mesh.mesh().y()[node]];
+            let at = [mesh.mesh.x()[node], mesh.mesh.y()[node]];
             for (axis, number) in holders.iter().enumerate() {
                 let value = number.map(|number| (self.supports[number].displacement)(at)[axis]);
                 problem.prescribed[2 * node + axis] = value;
             }
         }
         for traction in &self.tractions {
-            for side in mesh.sides().iter().filter(|side| is_in(&traction.on, side)) {
-                problem.tractions.push(Traction::sampled(mesh.mesh(), side.side, &traction.traction));
+            for side in mesh.sides.iter().filter(|side| is_in(&traction.on, side)) {
+                problem.tractions.push(Traction::sampled(&mesh.mesh, side.side, &traction.traction));
             }
         }
         for (index, &(at, force)) in self.point_forces.iter().enumerate() {
             let at = self.on_body(index, at)?;
             let node =
-                self.node_at(mesh.mesh(), at).ok_or(FemError::OutsideMesh { index, x: at[0], y: at[1] })?;
+                self.node_at(&mesh.mesh, at).ok_or(FemError::OutsideMesh { index, x: at[0], y: at[1] })?;
             problem.forces.push((node, force));
         }
         (problem.body_force, problem.strain) = (self.body_force, self.strain);
@@ -278,13 +278,13 @@ impl<'a> ShapeProblem<'a> {
     fn nodes(&self, number: usize, on: &Holding, mesh: &OutlineMesh) -> Result<Vec<usize>, FemError> {
         let near = 2.0 * MERGED * self.outline.size();
         let within = |inside: &dyn Fn(Point) -> bool| {
-            let nodes = mesh.mesh().nodes_where(|x, y| inside([x, y]));
+            let nodes = mesh.mesh.nodes_where(|x, y| inside([x, y]));
             nodes.into_iter().map(|node| node as usize).collect()
         };
         Ok(match on {
             Holding::Portions(portions) => {
-                let sides = mesh.sides().iter().filter(|side| is_in(portions, side));
-                sides.flat_map(|side| mesh.mesh().side_nodes(side.side)).collect()
+                let sides = mesh.sides.iter().filter(|side| is_in(portions, side));
+                sides.flat_map(|side| mesh.mesh.side_nodes(side.side)).collect()
             }
             Holding::Region(area) => within(&|p| area.contains(p, near)),
             Holding::Segment([from, to]) => {
@@ -293,7 +293,7 @@ impl<'a> ShapeProblem<'a> {
             }
             Holding::Point(at) => {
                 let at = self.on_body(number, *at)?;
-                self.node_at(mesh.mesh(), at).into_iter().collect()
+                self.node_at(&mesh.mesh, at).into_iter().collect()
             }
         })
     }

@@ -126,12 +126,12 @@ fn refine(problem: &ShapeProblem<'_>, effort: &Effort, is_graded: bool) -> Resul
         };
         let change = last.as_ref().map_or(0.0, |(coarse, _)| change(coarse, &solution));
         let reactions = reactions(problem.supports.len(), &on_mesh, &holder, &solution);
-        levels.push(Level { nodes: mesh.mesh().node_count(), energy: solution.strain_energy(), change });
+        levels.push(Level { nodes: mesh.mesh.node_count(), energy: solution.strain_energy(), change });
         let error = estimate(&levels);
         let is_enough = levels.len() >= 3 && error.displacement <= effort.target;
         // Singular points by the hundred make even the coarsest mesh a large one.
-        let is_large = mesh.mesh().node_count() > effort.most_nodes;
-        let is_all = is_large || levels.len() >= 3 && 4 * mesh.mesh().node_count() > effort.most_nodes;
+        let is_large = mesh.mesh.node_count() > effort.most_nodes;
+        let is_all = is_large || levels.len() >= 3 && 4 * mesh.mesh.node_count() > effort.most_nodes;
         if is_enough || is_all {
             return Ok(solved((solution, reactions), levels));
         }

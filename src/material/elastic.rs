@@ -13,10 +13,11 @@ pub type Voigt = Matrix3<f64>;
 
 /// The assumption across the thickness.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Plane {
-    /// The faces are free: a thin sheet.
+    /// A thin sheet with free faces
     Stress,
-    /// The faces cannot part: a slice of a long body.
+    /// A slice of a long body
     Strain,
 }
 

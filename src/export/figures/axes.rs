@@ -1,6 +1,6 @@
 //! A framed plot with ticks: where a point of the data comes to lie on the sheet.
 
-use super::svg::{Anchor, INK, Svg, text_width};
+use super::svg::{Anchor, INK, Svg};
 use super::ticks::Ticks;
 
 /// Size of tick labels and of axis names \[px\].
@@ -73,7 +73,7 @@ impl Axes {
         let mut horizontal = ticks(0, 44.0);
         // Long labels need more room, and fewer ticks may have shorter labels.
         for _ in 0..3 {
-            horizontal = ticks(0, (widest_label(&horizontal) + 16.0).max(44.0));
+            horizontal = ticks(0, (horizontal.widest_label(TICK_TEXT) + 16.0).max(44.0));
         }
         [horizontal, ticks(1, 34.0)]
     }
@@ -81,7 +81,7 @@ impl Axes {
     /// Room that the labels of the vertical axis take to the left of the plot \[px\].
     pub fn left_of_plot(&self) -> f64 {
         let [_, ticks] = self.ticks();
-        widest_label(&ticks) + TICK + 34.0
+        ticks.widest_label(TICK_TEXT) + TICK + 34.0
     }
 
     pub fn draw(&self, svg: &mut Svg, [x, y]: [Measure<'_>; 2]) {
@@ -125,10 +125,6 @@ impl Axes {
         let at = [left - room + 14.0, self.corner[1] + self.size[1] / 2.0];
         svg.upward_text(at, NAME_TEXT, &name);
     }
-}
-
-fn widest_label(ticks: &Ticks) -> f64 {
-    ticks.values.iter().map(|&value| text_width(&ticks.label(value), TICK_TEXT)).fold(0.0, f64::max)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::axes::Axes;
 use super::colour::viridis;
 use super::raster::Raster;
-use super::svg::{Anchor, INK, Svg, text_width};
+use super::svg::{Anchor, INK, Svg};
 use super::ticks::Ticks;
 use crate::ranks::Team;
 
@@ -15,10 +15,12 @@ const BAR_GAP: f64 = 18.0;
 /// A point of the sheet \[px\] and the field's value there.
 pub type Sample = ([f64; 2], f64);
 
-/// Levels at round values around the field's range.
+/// Levels at round values around the range of a quantity, which has a name in the end.
 #[derive(Clone, Debug)]
 pub struct Bands {
     levels: Ticks,
+    quantity: String,
+    unit: String,
 }
 
 impl Bands {
@@ -35,7 +37,13 @@ impl Bands {
     fn of_most(most: f64, low: f64, high: f64, noise: f64) -> Self {
         let value = if high.abs() <= noise || !high.is_finite() { 0.0 } else { high };
         let varies = high - low > noise.max(1e-9 * high.abs());
-        Self { levels: if varies { Ticks::around(low, high, most) } else { Ticks::single(value) } }
+        let levels = if varies { Ticks::around(low, high, most) } else { Ticks::single(value) };
+        Self { levels, quantity: String::new(), unit: String::new() }
+    }
+
+    /// The same of this quantity.
+    pub fn named(self, quantity: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self { quantity: quantity.into(), unit: unit.into(), ..self }
     }
 
     pub fn count(&self) -> usize {
@@ -81,11 +89,11 @@ impl Bands {
 
     /// Room that the bar takes beside a plot \[px\].
     pub fn bar_room(&self) -> f64 {
-        BAR_GAP + BAR_WIDTH + 8.0 + self.widest_label() + 30.0
+        BAR_GAP + BAR_WIDTH + 8.0 + self.levels.widest_label(LABEL_TEXT) + 30.0
     }
 
     /// Draws the colour bar to the right of a plot.
-    pub fn draw_bar(&self, svg: &mut Svg, axes: &Axes, quantity: &str, unit: &str) {
+    pub fn draw_bar(&self, svg: &mut Svg, axes: &Axes) {
         let (left, top) = (axes.corner[0] + axes.size[0] + BAR_GAP, axes.corner[1]);
         let (height, count) = (axes.size[1], self.count());
         let part = height / count as f64;
@@ -101,21 +109,15 @@ impl Bands {
             let label = self.levels.label(value);
             svg.text([left + BAR_WIDTH + 7.0, y], Anchor::Start, LABEL_TEXT, INK, &label);
         }
-        let name_x = left + BAR_WIDTH + 8.0 + self.widest_label() + 14.0;
-        svg.upward_text([name_x, top + height / 2.0], NAME_TEXT, &self.levels.axis_name(quantity, unit));
-    }
-
-    fn widest_label(&self) -> f64 {
-        let width = |&value: &f64| text_width(&self.levels.label(value), LABEL_TEXT);
-        self.levels.values.iter().map(width).fold(0.0, f64::max)
+        let name_x = left + BAR_WIDTH + 8.0 + self.levels.widest_label(LABEL_TEXT) + 14.0;
+        let name = self.levels.axis_name(&self.quantity, &self.unit);
+        svg.upward_text([name_x, top + height / 2.0], NAME_TEXT, &name);
     }
 }
 
 /// Values of particles or robots, and their colours.
 #[derive(Clone, Copy, Debug)]
 pub struct Field<'a> {
-    pub quantity: &'a str,
-    pub unit: &'a str,
     pub bands: &'a Bands,
     /// Shape \[count\]; NaN where there is none.
     pub values: &'a [f64],
@@ -133,11 +135,6 @@ impl Field<'_> {
 
     pub fn colour(&self, band: usize) -> String {
         if band < self.bands.count() { self.bands.colour(band) } else { NO_VALUE.into() }
-    }
-
-    /// Draws the colour bar beside a plot.
-    pub fn draw_bar(&self, svg: &mut Svg, axes: &Axes) {
-        self.bands.draw_bar(svg, axes, self.quantity, self.unit);
     }
 }
 

@@ -208,7 +208,7 @@ pub fn configuration_in(
             }
         }
         if let Some(field) = field {
-            field.draw_bar(svg, axes);
+            field.bands.draw_bar(svg, axes);
         }
     })
 }

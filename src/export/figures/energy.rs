@@ -26,6 +26,7 @@ pub fn pe1(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
         .fold([f64::NEG_INFINITY; 2], |[below, high], value| [below.max(-value), high.max(value)]);
     let [below, high] = subject.largest(ends);
     let bands = Bands::around(-below, high, (NOISE_IN_SPACINGS * spacing).powi(2));
+    let bands = bands.named("PE1", format!("{}²", subject.unit));
     let axes = page::around(subject.bounds(page::bounds(&snapshot.positions, drawn())), spacing);
     let note = format!("first pseudo-energy, {}", page::note(subject, snapshot));
     let mut heading = Heading { title: subject.title.into(), note, ..Heading::default() };
@@ -42,7 +43,7 @@ pub fn pe1(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
             drawn().for_each(|i| is_drawn[i] = true);
             draw_contours(svg, axes, subject, (snapshot, &snapshot.pe1), &is_drawn, &bands);
         }
-        bands.draw_bar(svg, axes, "PE1", &format!("{}²", subject.unit));
+        bands.draw_bar(svg, axes);
     })
 }
 

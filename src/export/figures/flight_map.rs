@@ -96,7 +96,7 @@ impl<'a> Map<'a> {
             });
             self.draw_robots(svg, axes, moment);
             if let Some(field) = &moment.field {
-                field.draw_bar(svg, axes);
+                field.bands.draw_bar(svg, axes);
             }
         })
     }

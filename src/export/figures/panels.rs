@@ -4,7 +4,7 @@ use super::axes::{Axes, Measure};
 use super::colour::{blue_to_red, viridis};
 use super::heading::Heading;
 use super::raster::Raster;
-use super::svg::{Anchor, INK, Path, Svg, text_width};
+use super::svg::{Anchor, INK, Svg, text_width};
 use super::ticks::Ticks;
 use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
@@ -111,9 +111,8 @@ impl Scale {
     }
 
     fn widest_label(&self) -> f64 {
-        let width = |&value: &f64| text_width(&self.ticks.label(value), TICK_TEXT);
         let above = self.above.map_or(0.0, |largest| text_width(&self.up_to(largest), TICK_TEXT));
-        self.ticks.values.iter().map(width).fold(above, f64::max)
+        self.ticks.widest_label(TICK_TEXT).max(above)
     }
 
     fn up_to(&self, largest: f64) -> String {
@@ -222,18 +221,10 @@ impl Sheet<'_> {
         let name_at = [axes.corner[0] + axes.size[0] / 2.0, axes.corner[1] - 0.6 * NAME_TEXT - 2.0];
         svg.text(name_at, Anchor::Middle, NAME_TEXT, INK, panel.name);
         let scale = &self.scales[panel.scale];
-        let is_raster = self.is_raster;
-        let paths = if is_raster { self.squares(panel, scale) } else { self.polygons(panel, scale) };
-        // A hairline of its own colour around each cell covers the seams between cells.
-        let line = if is_raster {
-            "shape-rendering=\"crispEdges\""
-        } else {
-            "stroke-width=\"0.4\" stroke-linejoin=\"round\""
-        };
-        for (shade, path) in paths.iter().enumerate().filter(|(_, path)| !path.is_empty()) {
-            let colour = scale.colour(shade);
-            let stroke = if is_raster { "none" } else { &colour };
-            svg.path(path, format_args!("class=\"cells\" fill=\"{colour}\" stroke=\"{stroke}\" {line}"));
+        let (shade, colour) = (|stress| scale.shade(stress), |shade| scale.colour(shade));
+        match self.is_raster {
+            true => self.squares(panel).draw(svg, SHADES + 1, shade, colour),
+            false => svg.cells(self.shown(panel), SHADES + 1, shade, colour),
         }
         axes.draw_frame(svg);
         if number == 0 || !self.is_row {
@@ -256,18 +247,12 @@ impl Sheet<'_> {
         })
     }
 
-    fn polygons(&self, panel: &Panel<'_>, scale: &Scale) -> Vec<Path> {
-        let mut paths = vec![Path::default(); SHADES + 1];
-        self.shown(panel).for_each(|(corners, stress)| paths[scale.shade(stress)].polygon(corners));
-        paths
-    }
-
-    fn squares(&self, panel: &Panel<'_>, scale: &Scale) -> Vec<Path> {
+    fn squares(&self, panel: &Panel<'_>) -> Raster {
         let mut raster = Raster::of_size_over(&self.axes, self.spacing);
         for (corners, stress) in self.shown(panel) {
             let corners: Vectors = corners.into_iter().collect();
             raster.drop(corners.middle(), stress);
         }
-        raster.of_all(self.team).paths(SHADES + 1, |stress| scale.shade(stress))
+        raster.of_all(self.team)
     }
 }

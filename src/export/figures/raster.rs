@@ -62,7 +62,7 @@ impl Raster {
     }
 
     /// The squares of each class, neighbours in a row joined, as one path per class.
-    pub fn paths(&self, classes: usize, class: impl Fn(f64) -> usize) -> Vec<Path> {
+    fn paths(&self, classes: usize, class: impl Fn(f64) -> usize) -> Vec<Path> {
         let mut paths = vec![Path::default(); classes];
         for (row, squares) in self.largest.chunks(self.columns).enumerate() {
             let of_square: Vec<Option<usize>> = squares.iter().map(|value| value.map(&class)).collect();
@@ -87,7 +87,8 @@ impl Raster {
         class: impl Fn(f64) -> usize,
         colour: impl Fn(usize) -> String,
     ) {
-        for (n, path) in self.paths(classes, class).iter().enumerate() {
+        let paths = self.paths(classes, class);
+        for (n, path) in paths.iter().enumerate().filter(|(_, path)| !path.is_empty()) {
             svg.path(path, format_args!("fill=\"{}\" shape-rendering=\"crispEdges\"", colour(n)));
         }
     }

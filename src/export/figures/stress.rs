@@ -7,7 +7,6 @@ use super::comparison::{displaced, enlargement, largest_of, scale_note};
 use super::energy::draw_bands;
 use super::heading::Heading;
 use super::page::{self, Bounds};
-use super::svg::{Path, Svg};
 use crate::continuum::mechanics::Stresses;
 use crate::continuum::record::Snapshot;
 use crate::flock::vectors::Vectors;
@@ -44,7 +43,7 @@ pub fn stress(
     let values = shown.iter().map(|(_, value)| *value).chain(corners.iter().flatten().copied().flatten());
     let ends = values.fold([f64::NEG_INFINITY, 0.0], |[below, high], v| [f64::max(below, -v), high.max(v)]);
     let [below, high] = subject.largest(ends);
-    let bands = Bands::fine(high.min(-below), high, NOISE * high);
+    let bands = Bands::fine(high.min(-below), high, NOISE * high).named("von Mises stress", unit);
     let spacing = subject.body.lattice.spacing();
     let axes = page::around(bounds(subject, snapshot, &places), spacing);
     let place = if corners.is_some() { "" } else { " in the cells" };
@@ -63,9 +62,11 @@ pub fn stress(
         } else if let Some(values) = &corners {
             draw_bands(svg, &patches(axes, &places, &shown, values), &bands);
         } else {
-            draw_cells(svg, axes, &places, &shown, &bands);
+            let corners = |cell: &[u32]| cell.iter().map(|&i| axes.place(places.get(i as usize))).collect();
+            let cells = shown.iter().map(|(cell, value)| (corners(cell), *value));
+            svg.cells(cells, bands.count(), |value| bands.of(value), |band| bands.colour(band));
         }
-        bands.draw_bar(svg, axes, "von Mises stress", unit);
+        bands.draw_bar(svg, axes);
     })
 }
 
@@ -111,17 +112,4 @@ pub(super) fn enlarged(subject: &Subject<'_>, snapshot: &Snapshot) -> (Vectors, 
 pub(in crate::export) fn displacement(subject: &Subject<'_>, snapshot: &Snapshot) -> Vectors {
     let moved = |(now, then): ([f64; 2], [f64; 2])| [now[0] - then[0], now[1] - then[1]];
     snapshot.positions.iter().zip(subject.body.reference.iter()).map(moved).collect()
-}
-
-fn draw_cells(svg: &mut Svg, axes: &Axes, places: &Vectors, shown: &[(&[u32], f64)], bands: &Bands) {
-    let mut paths = vec![Path::default(); bands.count()];
-    for (cell, value) in shown {
-        paths[bands.of(*value)].polygon(cell.iter().map(|&i| axes.place(places.get(i as usize))));
-    }
-    // A hairline of its own colour around each cell covers the seams between cells.
-    for (band, path) in paths.iter().enumerate().filter(|(_, path)| !path.is_empty()) {
-        let colour = bands.colour(band);
-        let line = "stroke-width=\"0.4\" stroke-linejoin=\"round\"";
-        svg.path(path, format_args!("class=\"cells\" fill=\"{colour}\" stroke=\"{colour}\" {line}"));
-    }
 }

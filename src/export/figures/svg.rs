@@ -75,6 +75,24 @@ impl Svg {
         self.push(format_args!("<path {attributes} d=\"{}\"/>", path.0));
     }
 
+    /// Draws the cells of each class in its colour: the corners of each \[px\], and the value that it is classed by. A hairline of
+    /// its own colour around each covers the seams between them.
+    pub fn cells(
+        &mut self,
+        cells: impl Iterator<Item = (Vec<[f64; 2]>, f64)>,
+        classes: usize,
+        class: impl Fn(f64) -> usize,
+        colour: impl Fn(usize) -> String,
+    ) {
+        let mut paths = vec![Path::default(); classes];
+        cells.for_each(|(corners, value)| paths[class(value)].polygon(corners));
+        for (class, path) in paths.iter().enumerate().filter(|(_, path)| !path.is_empty()) {
+            let colour = colour(class);
+            let line = "stroke-width=\"0.4\" stroke-linejoin=\"round\"";
+            self.path(path, format_args!("class=\"cells\" fill=\"{colour}\" stroke=\"{colour}\" {line}"));
+        }
+    }
+
     /// One line of text, centred on the height of `at`.
     pub fn text(&mut self, at: [f64; 2], anchor: Anchor, size: f64, colour: &str, content: &str) {
         self.turned_text(at, anchor, size, colour, content, "");

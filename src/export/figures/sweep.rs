@@ -149,7 +149,7 @@ fn lines(swept: &Swept<'_>, key: &Column) -> String {
 fn heat_map(swept: &Swept<'_>, keys: [&Column; 2], output: &Column) -> String {
     let heading = swept.heading(output, "grey");
     let [low, high] = output.ends();
-    let bands = Bands::around(low, high, 0.0);
+    let bands = Bands::around(low, high, 0.0).named(&output.name, "");
     let edges = keys.map(|key| if swept.is_grid { cell_edges(key) } else { around(key) });
     let end = |k: usize| [edges[k][0], edges[k][edges[k].len() - 1]];
     let mut axes = Axes {
@@ -185,7 +185,7 @@ fn heat_map(swept: &Swept<'_>, keys: [&Column; 2], output: &Column) -> String {
         &mut svg,
         [Measure { quantity: &names[0], unit: "" }, Measure { quantity: &names[1], unit: "" }],
     );
-    bands.draw_bar(&mut svg, &axes, &output.name, "");
+    bands.draw_bar(&mut svg, &axes);
     svg.finish()
 }
 

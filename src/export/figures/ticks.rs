@@ -1,5 +1,7 @@
 //! Round values along an axis, and how they are written.
 
+use super::svg::text_width;
+
 /// Values at multiples of 1, 2 or 5 times a power of ten.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ticks {
@@ -48,6 +50,11 @@ impl Ticks {
             Some(digits) => format!("\u{2212}{digits}"),
             None => text,
         }
+    }
+
+    /// Width of the widest label in letters of this size \[px\].
+    pub fn widest_label(&self, size: f64) -> f64 {
+        self.values.iter().map(|&value| text_width(&self.label(value), size)).fold(0.0, f64::max)
     }
 
     /// `quantity [unit]`, with the power of ten that the labels leave out; a count has no unit.

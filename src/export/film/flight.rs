@@ -1,7 +1,7 @@
 //! The film of a flight: its map at one time after another, with the ways flown so far.
 
-use super::{Film, FilmColour, Scale, chosen};
-use crate::export::figures::bands::Bands;
+use super::{Film, FilmColour, chosen};
+use crate::export::figures::bands::{Bands, Field};
 use crate::export::figures::flight_map::{Map, Moment};
 use crate::export::figures::page;
 use crate::export::report::FlightRecorder;
@@ -21,30 +21,30 @@ pub fn film<'a>(
     recorder: &'a FlightRecorder,
     colour: FilmColour,
 ) -> Film<'a> {
-    let frames = chosen(recorder.frames().len());
+    let frames = chosen(recorder.frames.kept.len());
     let values = move |frame: usize| match colour {
         FilmColour::Role => None,
         FilmColour::Displacement => {
-            let [dx, dy] = ["dx", "dy"].map(|name| recorder.values(frame, name));
+            let [dx, dy] = ["dx", "dy"].map(|name| recorder.frames.values(frame, name));
             Some(dx?.into_iter().zip(dy?).map(|(x, y)| x.hypot(y)).collect::<Vec<_>>())
         }
-        _ => recorder.values(frame, colour.name()),
+        _ => recorder.frames.values(frame, colour.name()),
     };
     let finite =
         |frame: &usize| values(*frame).unwrap_or_default().into_iter().filter(|value| value.is_finite());
     let range = frames.iter().flat_map(finite);
     let range = range.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [f64::min(l, v), f64::max(h, v)]);
-    let scale = scale(colour, range);
+    let bands = bands(colour, range);
     let places = move |frame: usize| -> Vectors {
-        let [dx, dy] = ["dx", "dy"].map(|name| recorder.values(frame, name).unwrap_or_default());
+        let [dx, dy] = ["dx", "dy"].map(|name| recorder.frames.values(frame, name).unwrap_or_default());
         let moved = dx.into_iter().zip(dy);
-        recorder.start().iter().zip(moved).map(|([x, y], (dx, dy))| [x + dx, y + dy]).collect()
+        recorder.start.iter().zip(moved).map(|([x, y], (dx, dy))| [x + dx, y + dy]).collect()
     };
     let map = Map::new(swarm, record, report, page::around_in_film);
     let count = frames.len();
     let draw = move |n: usize| {
         let (frame, values) = (frames[n], values(frames[n]));
-        let field = scale.as_ref().zip(values.as_deref()).map(|(scale, values)| scale.field(values));
+        let field = bands.as_ref().zip(values.as_deref()).map(|(bands, values)| Field { bands, values });
         let time = recorder.time(frame);
         // The periods are whole, times are sums of them.
         let flown = record.times.partition_point(|&at| at <= time + 1e-9 * time.abs());
@@ -54,12 +54,13 @@ pub fn film<'a>(
     Film { count, draw: Box::new(draw) }
 }
 
-fn scale(colour: FilmColour, [low, high]: [f64; 2]) -> Option<Scale<'static>> {
+/// Bands for values from the lowest to the highest of all frames.
+fn bands(colour: FilmColour, [low, high]: [f64; 2]) -> Option<Bands> {
     let (quantity, unit) = match colour {
         FilmColour::Role => return None,
         FilmColour::Displacement => ("displacement", "m"),
         _ => FlightRecorder::label_and_unit(colour.name())?,
     };
     let noise = if colour == FilmColour::Pe1 { NOISE * NOISE } else { NOISE };
-    Some(Scale { quantity, unit: unit.into(), bands: Bands::around(low, high, noise) })
+    Some(Bands::around(low, high, noise).named(quantity, unit))
 }

@@ -20,7 +20,6 @@ use std::path::PathBuf;
 
 use rayon::prelude::*;
 
-use super::figures::bands::{Bands, Field};
 use super::figures::png::{Painter, Picture};
 pub use error::FilmError;
 pub use place::{FilmFile, FilmFormat};
@@ -77,19 +76,6 @@ impl FilmColour {
         Self::Pe1,
         Self::Strain,
     ];
-}
-
-/// Values of a film's particles or robots on a scale for all its frames.
-struct Scale<'a> {
-    quantity: &'a str,
-    unit: String,
-    bands: Bands,
-}
-
-impl Scale<'_> {
-    fn field<'f>(&'f self, values: &'f [f64]) -> Field<'f> {
-        Field { quantity: self.quantity, unit: &self.unit, bands: &self.bands, values }
-    }
 }
 
 /// Sheets to be drawn one after another; all are of one size.

@@ -5,11 +5,12 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-use super::{Film, FilmColour, FilmError, Scale, chosen};
+use super::{Film, FilmColour, FilmError, chosen};
 use crate::continuum::mechanics::Stresses;
 use crate::continuum::record::Snapshot;
 use crate::continuum::run::Outcome;
 use crate::engine::Engine;
+use crate::export::figures::bands::{Bands, Field};
 use crate::export::figures::configuration::{Setting, configuration_in};
 use crate::export::figures::{Subject, displaced, page};
 use crate::export::largest_strain;
@@ -48,7 +49,7 @@ pub fn film<'a>(
     recorder: &'a RunRecorder,
     colour: FilmColour,
 ) -> Film<'a> {
-    let frames = chosen(recorder.frames().len());
+    let frames = chosen(recorder.frames.kept.len());
     let shown = Shown::new(scene, &outcome.engine, recorder, colour);
     let mut setting = Setting::of_film();
     let subject = shown.subject();
@@ -56,15 +57,15 @@ pub fn film<'a>(
         let (snapshot, values) = (shown.snapshot(frame), shown.values(frame));
         setting.include(&subject, &snapshot, values.as_deref());
     }
-    let scale = shown.scale(&setting);
+    let bands = shown.bands(&setting);
     for &frame in &frames {
-        setting.reserve(&subject, shown.note(&subject, frame), scale.as_ref().map(|scale| &scale.bands));
+        setting.reserve(&subject, shown.note(&subject, frame), bands.as_ref());
     }
     let count = frames.len();
     let draw = move |n: usize| {
         let frame = frames[n];
         let (snapshot, values) = (shown.snapshot(frame), shown.values(frame));
-        let field = scale.as_ref().zip(values.as_deref()).map(|(scale, values)| scale.field(values));
+        let field = bands.as_ref().zip(values.as_deref()).map(|(bands, values)| Field { bands, values });
         let subject = shown.subject();
         let note = shown.note(&subject, frame);
         configuration_in(&setting, &subject, &snapshot, note, field.as_ref())
@@ -94,14 +95,14 @@ impl<'a> Shown<'a> {
             FilmColour::Pe1 => Some(PE1),
             _ => None,
         };
-        let is_part_of_end = colour == FilmColour::VonMises && recorder.is_solved();
+        let is_part_of_end = colour == FilmColour::VonMises && recorder.is_solved;
         let is_computed = quantity.is_some_and(|quantity| !recorder.keeps(quantity)) && !is_part_of_end;
         let largest_strain = is_computed.then(|| largest_strain(engine)).flatten();
         let of_sample = |sample: &Sample| {
             let places = sample.ids.iter().copied().zip(0..).collect();
             (sample.body(engine.body().lattice.spacing()), places)
         };
-        let sample = recorder.sample().map(of_sample);
+        let sample = recorder.sample.as_ref().map(of_sample);
         let final_stress = OnceLock::new();
         Self { scene, engine, recorder, colour, sample, largest_strain, final_stress }
     }
@@ -119,16 +120,16 @@ impl<'a> Shown<'a> {
 
     /// As it was kept; at the end as it is, but for a sample.
     fn displacement(&self, frame: usize) -> Vectors {
-        if frame + 1 == self.recorder.frames().len() && self.sample.is_none() {
+        if frame + 1 == self.recorder.frames.kept.len() && self.sample.is_none() {
             return self.engine.displacements();
         }
-        let tracks = &self.recorder.frames()[frame].tracks;
+        let tracks = &self.recorder.frames.kept[frame].tracks;
         Vectors { x: tracks[0].values(), y: tracks[1].values() }
     }
 
     /// The configuration, without the energies, which the figure does not show.
     fn snapshot(&self, frame: usize) -> Snapshot {
-        let step = self.recorder.frames()[frame].step;
+        let step = self.recorder.frames.kept[frame].step;
         Snapshot {
             step,
             positions: displaced(&self.subject().body.reference, &self.displacement(frame), 1.0),
@@ -151,14 +152,14 @@ impl<'a> Shown<'a> {
     }
 
     fn broken(&self, frame: usize) -> Vec<[u32; 2]> {
-        let step = self.recorder.frames()[frame].step;
+        let step = self.recorder.frames.kept[frame].step;
         // Bonds of a body at rest were broken before its load.
-        let is_broken = |at: usize| self.recorder.is_solved() || at <= step;
+        let is_broken = |at: usize| self.recorder.is_solved || at <= step;
         self.engine.breaks().iter().filter(|one| is_broken(one.step)).map(|one| one.pair).collect()
     }
 
     fn note(&self, subject: &Subject<'_>, frame: usize) -> String {
-        let step = self.recorder.frames()[frame].step;
+        let step = self.recorder.frames.kept[frame].step;
         let clock = match self.recorder.part_of_load(step) {
             Some(part) => {
                 let of = if is_linear(self.scene) { "load" } else { "displacement" };
@@ -178,7 +179,7 @@ impl<'a> Shown<'a> {
         /// Part of the largest strain that is seen \[1\].
         const SEEN: f64 = 0.02;
         let largest = self.largest_strain.filter(|&largest| largest > 0.0)?;
-        let frames = self.recorder.frames();
+        let frames = &self.recorder.frames.kept;
         if frame + 1 == frames.len() {
             return None;
         }
@@ -189,7 +190,7 @@ impl<'a> Shown<'a> {
 
     /// Shape \[count\]; none where roles are shown.
     fn values(&self, frame: usize) -> Option<Vec<f64>> {
-        let kept = |quantity| self.recorder.values(frame, quantity);
+        let kept = |quantity| self.recorder.frames.values(frame, quantity);
         Some(match self.colour {
             FilmColour::Displacement => self.displacement(frame).iter().map(|[x, y]| x.hypot(y)).collect(),
             FilmColour::Pe2 => kept(PE2)?,
@@ -228,7 +229,7 @@ impl<'a> Shown<'a> {
     }
 
     fn stress(&self, frame: usize) -> Vec<f64> {
-        let step = self.recorder.frames()[frame].step;
+        let step = self.recorder.frames.kept[frame].step;
         // Frames of a body that is not linear keep theirs.
         if let Some(part) = self.recorder.part_of_load(step) {
             let whole = self.final_stress.get_or_init(|| von_mises(Stresses::at_present(self.engine)));
@@ -239,7 +240,8 @@ impl<'a> Shown<'a> {
         found.map_or_else(|| vec![f64::NAN; displacement.len()], |found| von_mises(Some(found)))
     }
 
-    fn scale(&self, setting: &Setting) -> Option<Scale<'static>> {
+    /// Bands for the values of all frames.
+    fn bands(&self, setting: &Setting) -> Option<Bands> {
         let (unit, spacing) = (self.scene.unit(), self.engine.body().lattice.spacing());
         let (quantity, unit, noise) = match self.colour {
             FilmColour::Displacement => ("displacement", unit.to_owned(), NOISE * spacing),
@@ -249,7 +251,7 @@ impl<'a> Shown<'a> {
             FilmColour::VonMises => ("von Mises stress", Units::of(self.scene).stress, 0.0),
             _ => return None,
         };
-        Some(Scale { quantity, unit, bands: setting.bands(noise) })
+        Some(setting.bands(noise).named(quantity, unit))
     }
 }
 
@@ -323,9 +325,9 @@ mod tests {
         for films in [true, false] {
             let (outcome, mut recorder, seen) = ran(&scene, films, see);
             let shown = Shown::new(&scene, &outcome.engine, &recorder, FilmColour::VonMises);
-            let frame = recorder.frames().len() - 2;
+            let frame = recorder.frames.kept.len() - 2;
             let values = shown.values(frame).expect("shown");
-            let step = recorder.frames()[frame].step;
+            let step = recorder.frames.kept[frame].step;
             let (_, recovered, of_cells) = seen.iter().find(|one| one.0 == step).expect("it was seen");
             let off =
                 |other: &[f64]| values.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -358,7 +360,7 @@ mod tests {
                 let values = shown.values(frame).expect("shown");
                 values.iter().map(|value| (value / expected - 1.0).abs()).fold(0.0, f64::max)
             };
-            let last = recorder.frames().len() - 1;
+            let last = recorder.frames.kept.len() - 1;
             assert!(worst(last) < 1e-8 && shown.uncertain(last).is_none(), "{colour:?}: {}", worst(last));
             // Half way it is stretched by as much as it turns back.
             let off = shown.uncertain(last - 1).expect("said");

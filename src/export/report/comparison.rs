@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use super::super::OutputFolder;
 use super::super::comparison::ComparisonReport;
 use super::super::error::ExportError;
-use super::encoded;
 use super::frames::{Channel, Frames};
 use super::page::{Page, Table, number, scene_text};
 use super::view::{Animation, Clock, Quantity, View};
@@ -94,9 +93,8 @@ fn stage(
     stage.set_cells(&compared.cells);
     stage.add_exact(Quantity::new("ux", "x displacement", unit), moved.x.iter().copied());
     stage.add_exact(Quantity::new("uy", "y displacement", unit), moved.y.iter().copied());
-    let channel = |(name, bits)| Channel { name, bits };
-    let names = [("dx", BITS), ("dy", BITS), ("von_mises", BITS), ("error", BITS)];
-    let mut frames = Frames::new(moved.len(), names.map(channel).into());
+    let channels = ["dx", "dy", "von_mises", "error"].map(|name| Channel { name, bits: BITS });
+    let mut frames = Frames::new(moved.len(), channels.into());
     for frame in 0..=FRAMES {
         let part = frame as f64 / FRAMES as f64;
         let scaled =
@@ -104,9 +102,7 @@ fn stage(
         let values = |k: usize, _: &Channel| (&scaled[k]).into();
         if frame == FRAMES { frames.keep_last(frame, values) } else { frames.keep(frame, values) }
     }
-    let encoded = encoded(&mut frames, stage.size());
-    let times = frames.kept().iter().map(|frame| 100.0 * frame.step as f64 / FRAMES as f64).collect();
-    stage.set_frames(&frames, encoded, times);
+    stage.set_frames(&mut frames, |step| 100.0 * step as f64 / FRAMES as f64);
     stage
 }
 
@@ -121,16 +117,16 @@ fn on_particles(compared: &Compared, of_cells: &[f64]) -> Vec<f64> {
     (0..count).map(mean).collect()
 }
 
-fn facts(scene: &Scene, report: &ComparisonReport) -> Vec<(String, String)> {
+fn facts(scene: &Scene, report: &ComparisonReport) -> Vec<(&'static str, String)> {
     let rule = &report.rule;
     let way = match (rule.solver, rule.iterations) {
         (Some(solver), Some(iterations)) => format!("{solver}, {}", counted(iterations, "iteration")),
         _ => counted(rule.steps, "step"),
     };
     vec![
-        ("Rule".into(), format!("by {way}: {}", rule.stop_reason)),
+        ("Rule", format!("by {way}: {}", rule.stop_reason)),
         (
-            "Reference".into(),
+            "Reference",
             match report.truth.stated_error {
                 Some(error) => format!(
                     "finite elements on the shape, {} nodes, own error {} %",
@@ -141,7 +137,7 @@ fn facts(scene: &Scene, report: &ComparisonReport) -> Vec<(String, String)> {
             },
         ),
         (
-            "Compared".into(),
+            "Compared",
             format!(
                 "{} followers, {} cells, lengths in {}",
                 report.comparison.followers,

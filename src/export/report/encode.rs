@@ -41,7 +41,7 @@ pub struct EncodedFrames {
 
 impl EncodedFrames {
     pub fn of(frames: &Frames) -> Self {
-        let groups: Vec<(Vec<u8>, String)> = frames.kept().par_chunks(GROUP).map(encode_group).collect();
+        let groups: Vec<(Vec<u8>, String)> = frames.kept.par_chunks(GROUP).map(encode_group).collect();
         let (modes, groups): (Vec<_>, Vec<_>) = groups.into_iter().unzip();
         Self { modes: modes.concat(), groups }
     }

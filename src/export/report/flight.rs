@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use super::super::error::ExportError;
 use super::super::figures::flight_map::{moves, outline};
 use super::super::{OutputFolder, flight};
-use super::encoded;
-use super::frames::{Channel, Frame, Frames};
+use super::frames::{Channel, Frames};
 use super::page::{Page, Table, file_texts, number};
 use super::view::{Animation, Clock, Outline, Quantity, View};
 use crate::flock::role::Role;
@@ -23,8 +22,10 @@ const MOST_ROWS: usize = 400;
 /// Keeps the frames of a flight while it goes on.
 #[derive(Debug)]
 pub struct FlightRecorder {
-    frames: Frames,
-    start: Vectors,
+    /// Of each robot its displacement \[m\], as `dx` and `dy`, and the other quantities.
+    pub(in crate::export) frames: Frames,
+    /// Places from which displacements are counted \[m\].
+    pub(in crate::export) start: Vectors,
     links: Vec<[u32; 2]>,
     leads: Vec<bool>,
     /// Whether it is known where each robot comes to rest.
@@ -64,7 +65,8 @@ impl FlightRecorder {
 
     /// Robots at these places \[m\], with displacements from `start` \[m\].
     fn since(control: &Control, places: &Vectors, start: Vectors) -> Self {
-        let channels = Self::names().map(|name| Channel { name, bits: BITS }).collect();
+        let names = ["dx", "dy"].into_iter().chain(QUANTITIES.map(|(name, ..)| name));
+        let channels = names.map(|name| Channel { name, bits: BITS }).collect();
         let formation = control.formation();
         let count = formation.count();
         // Seen from both ends or from one, a line between two robots is one line.
@@ -127,35 +129,15 @@ impl FlightRecorder {
         if is_last { self.frames.keep_last(period, values) } else { self.frames.keep(period, values) }
     }
 
-    pub(in crate::export) fn frames(&self) -> &[Frame] {
-        self.frames.kept()
-    }
-
-    /// Values of a quantity in a frame, by robot; `dx` and `dy` are displacements \[m\].
-    pub(in crate::export) fn values(&self, frame: usize, name: &str) -> Option<Vec<f64>> {
-        let track = Self::names().position(|known| known == name)?;
-        Some(self.frames.kept()[frame].tracks[track].values())
-    }
-
     /// Label and unit of a quantity of frames.
     pub(in crate::export) fn label_and_unit(name: &str) -> Option<(&'static str, &'static str)> {
         let (_, label, unit) = QUANTITIES.into_iter().find(|(known, ..)| *known == name)?;
         Some((label, unit))
     }
 
-    /// Names of the channels, in their order.
-    fn names() -> impl Iterator<Item = &'static str> {
-        ["dx", "dy"].into_iter().chain(QUANTITIES.map(|(name, ..)| name))
-    }
-
     /// Time of a frame \[s\].
     pub(in crate::export) fn time(&self, frame: usize) -> f64 {
-        self.frames.kept()[frame].step as f64 * self.period
-    }
-
-    /// Places from which displacements are counted \[m\].
-    pub(in crate::export) fn start(&self) -> &Vectors {
-        &self.start
+        self.frames.kept[frame].step as f64 * self.period
     }
 
     /// The animation of the flight.
@@ -201,9 +183,8 @@ impl FlightRecorder {
     }
 
     fn finished(&mut self, mut stage: View) -> View {
-        let encoded = encoded(&mut self.frames, stage.size());
-        let times = self.frames.kept().iter().map(|frame| frame.step as f64 * self.period).collect();
-        stage.set_frames(&self.frames, encoded, times);
+        let period = self.period;
+        stage.set_frames(&mut self.frames, |step| step as f64 * period);
         stage
     }
 }
@@ -287,11 +268,10 @@ fn note(animation: &Animation, report: &FlightReport) -> String {
     )
 }
 
-fn facts(report: &FlightReport) -> Vec<(String, String)> {
+fn facts(report: &FlightReport) -> Vec<(&'static str, String)> {
     let robots = format!("{} ({}), {} of them lead", report.robots, report.model, report.leaders);
     let first = [("Robots", robots), ("Flown", format!("{} s", number(report.seconds)))];
-    let facts = first.into_iter().chain(report.facts(number));
-    facts.map(|(name, value)| (name.to_owned(), value)).collect()
+    first.into_iter().chain(report.facts(number)).collect()
 }
 
 fn tables(report: &FlightReport) -> Vec<Table> {
@@ -354,10 +334,10 @@ mod tests {
             flight.step();
             recorder.watch(&flight, period == 63);
         }
-        let last = recorder.frames().len() - 1;
-        assert_eq!(recorder.frames()[last].step, 63);
+        let last = recorder.frames.kept.len() - 1;
+        assert_eq!(recorder.frames.kept[last].step, 63);
         assert_eq!(flight.control().settled(), None, "a leader is lost");
-        let away = |frame: usize| recorder.values(frame, "away").expect("known");
+        let away = |frame: usize| recorder.frames.values(frame, "away").expect("known");
         assert!(away(1).iter().all(|away| away.is_finite()));
         assert!(away(last).iter().all(|away| away.is_nan()), "{:?}", away(last));
     }
@@ -371,8 +351,8 @@ mod tests {
             flight.step();
             recorder.watch(&flight, false);
         }
-        let last = recorder.frames().len() - 1;
-        assert_eq!(recorder.frames()[last].step as u64, flight.periods().min(64));
+        let last = recorder.frames.kept.len() - 1;
+        assert_eq!(recorder.frames.kept[last].step as u64, flight.periods().min(64));
         let (control, places) = (flight.control(), flight.fleet().places());
         let mut clearance = Vec::new();
         control.filter().clearance(&places, &mut clearance);
@@ -380,12 +360,12 @@ mod tests {
         let speed: Vec<f64> = robots.map(|robot| robot.velocity[0].hypot(robot.velocity[1])).collect();
         let measures = control.formation().measures(&places);
         for (name, expected) in [("clearance", &clearance), ("speed", &speed), ("pe1", &measures.pe1)] {
-            let values = recorder.values(last, name).expect("known");
+            let values = recorder.frames.values(last, name).expect("known");
             let largest = expected.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
             assert!(largest > 0.0, "{name}");
             let off = values.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             assert!(off <= 1e-6 * largest, "{name}: {off} of {largest}");
         }
-        assert_eq!(recorder.values(last, "von-mises"), None);
+        assert_eq!(recorder.frames.values(last, "von-mises"), None);
     }
 }

@@ -42,9 +42,9 @@ impl Frame {
 pub struct Frames {
     pub channels: Vec<Channel>,
     pub count: usize,
-    kept: Vec<Frame>,
+    pub kept: Vec<Frame>,
     /// A frame of every so many steps is kept.
-    interval: usize,
+    pub interval: usize,
     most: usize,
 }
 
@@ -135,12 +135,10 @@ impl Frames {
         (self.kept, self.interval) = (kept, interval);
     }
 
-    pub fn kept(&self) -> &[Frame] {
-        &self.kept
-    }
-
-    pub fn interval(&self) -> usize {
-        self.interval
+    /// Values of a channel in a frame, where it is kept, shape \[count\].
+    pub fn values(&self, frame: usize, name: &str) -> Option<Vec<f64>> {
+        let channel = self.channels.iter().position(|channel| channel.name == name)?;
+        Some(self.kept[frame].tracks[channel].values())
     }
 }
 
@@ -156,14 +154,14 @@ mod tests {
                 if frames.wants(step) {
                     frames.keep(step, |_, _| vec![step as f64].into());
                 }
-                assert!(frames.kept().len() <= MOST_FRAMES);
+                assert!(frames.kept.len() <= MOST_FRAMES);
             }
             frames.keep_last(steps, |_, _| vec![steps as f64].into());
-            let kept: Vec<usize> = frames.kept().iter().map(|frame| frame.step).collect();
+            let kept: Vec<usize> = frames.kept.iter().map(|frame| frame.step).collect();
             let (last, even) = kept.split_last().expect("kept");
             assert_eq!(*last, steps);
-            assert!(even.iter().enumerate().all(|(k, &step)| step == k * frames.interval()), "{kept:?}");
-            assert!(kept.len() > MOST_FRAMES / 2 || frames.interval() == 1, "{steps}: {}", kept.len());
+            assert!(even.iter().enumerate().all(|(k, &step)| step == k * frames.interval), "{kept:?}");
+            assert!(kept.len() > MOST_FRAMES / 2 || frames.interval == 1, "{steps}: {}", kept.len());
             let [most, at_end] = frames.of_steps(steps);
             assert!(kept.len().abs_diff(at_end) <= 1 && most >= at_end, "{steps}: {most}, {at_end}");
         }
@@ -176,11 +174,11 @@ mod tests {
             frames.most = most;
             (0..20).for_each(|step| frames.keep(step, |_, _| vec![step as f64].into()));
             frames.keep_last(20, |_, _| vec![20.0].into());
-            let kept: Vec<usize> = frames.kept().iter().map(|frame| frame.step).collect();
+            let kept: Vec<usize> = frames.kept.iter().map(|frame| frame.step).collect();
             let (last, even) = kept.split_last().expect("kept");
             assert!(*last == 20 && 2 * even.len() >= most && even.len() <= most, "{most}: {kept:?}");
             assert!(
-                even.iter().enumerate().all(|(k, &step)| step == k * frames.interval()),
+                even.iter().enumerate().all(|(k, &step)| step == k * frames.interval),
                 "{most}: {kept:?}"
             );
         }

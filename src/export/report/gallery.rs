@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
+use serde_json::json;
 
 use super::super::error::{ExportError, write_file};
 use super::super::figures::png;
@@ -54,11 +55,6 @@ impl Exhibit {
     }
 }
 
-#[derive(Serialize)]
-struct List<'a> {
-    exhibits: &'a [Exhibit],
-}
-
 /// Writes `index.html` and `gallery.json`, the list of what it shows; the exhibits' outputs stand in the folder already.
 ///
 /// # Errors
@@ -77,7 +73,7 @@ pub fn write_gallery(folder: &OutputFolder, exhibits: &[Exhibit]) -> Result<Vec<
     let page = filled(PAGE, &[("program", program), ("style", STYLE.into()), ("sections", sections)]);
     let index = folder.path("index.html");
     write_file(&index, page)?;
-    Ok(vec![index, summary::write_signed(folder, LIST, &List { exhibits })?])
+    Ok(vec![index, summary::write_signed(folder, LIST, &json!({ "exhibits": exhibits }))?])
 }
 
 fn card(folder: &OutputFolder, exhibit: &Exhibit) -> Result<String, ExportError> {

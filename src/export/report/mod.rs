@@ -40,7 +40,7 @@ const MOST_TEXT: usize = 28 << 20;
 /// Compresses the frames, as many of them as fit a page beside `others` bytes of text.
 fn encoded(frames: &mut Frames, others: usize) -> EncodedFrames {
     let mut encoded = EncodedFrames::of(frames);
-    while encoded.size() + others > MOST_TEXT && frames.kept().len() > 3 {
+    while encoded.size() + others > MOST_TEXT && frames.kept.len() > 3 {
         frames.halve();
         encoded = EncodedFrames::of(frames);
     }

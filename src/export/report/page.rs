@@ -52,7 +52,7 @@ pub(crate) struct Page {
     pub note: String,
     pub plots: Vec<Chart>,
     /// Names and values.
-    pub facts: Vec<(String, String)>,
+    pub facts: Vec<(&'static str, String)>,
     pub tables: Vec<Table>,
     /// Long texts under their titles, folded.
     pub texts: Vec<(String, String)>,
@@ -150,7 +150,7 @@ impl Page {
     }
 
     fn facts_html(&self) -> String {
-        let fact = |(name, value): &(String, String)| {
+        let fact = |(name, value): &(&str, String)| {
             let class = if value.contains('\n') { " class=\"wide\"" } else { "" };
             format!("<div{class}><dt>{}</dt><dd>{}</dd></div>", escaped(name), escaped(value))
         };

@@ -7,11 +7,11 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::super::bonds::pairs;
+use super::MOST_TEXT;
 use super::encode::GROUP;
 use super::frames::{Channel, Frame, Frames};
 use super::sample::{self, Sample};
 use super::view::{Animation, Clock, Quantity, Stress, View};
-use super::{MOST_TEXT, encoded};
 use crate::continuum::mechanics::Stresses;
 use crate::continuum::memory::{measured, neighbour_entries};
 use crate::continuum::plan::Plan;
@@ -125,16 +125,17 @@ pub(in crate::export) fn packed(scene: &Scene, plan: &Plan, films: bool) -> Pack
 /// Keeps the frames of a run while it goes on.
 #[derive(Debug)]
 pub struct RunRecorder {
-    frames: Frames,
+    pub(in crate::export) frames: Frames,
     first_roles: Vec<Role>,
     roles: Vec<Role>,
     /// Step, particle and role.
     changes: Vec<[u32; 3]>,
-    is_solved: bool,
+    /// Whether the frames are parts of the way to a rest that was solved for.
+    pub(in crate::export) is_solved: bool,
     /// Whether stress on the way is recovered along the outline, which takes longer than a step.
     is_recovered: bool,
     /// The particles that are shown of a body in parts.
-    sample: Option<Sample>,
+    pub(in crate::export) sample: Option<Sample>,
 }
 
 impl RunRecorder {
@@ -195,8 +196,8 @@ impl RunRecorder {
     /// The frames and rows so far.
     pub fn animation_state(&self) -> AnimationState<'_> {
         AnimationState {
-            frames: Cow::Borrowed(self.frames.kept()),
-            interval: self.frames.interval(),
+            frames: Cow::Borrowed(&self.frames.kept),
+            interval: self.frames.interval,
             first_roles: self.first_roles.clone(),
             roles: self.roles.clone(),
             changes: self.changes.clone(),
@@ -206,7 +207,7 @@ impl RunRecorder {
 
     /// Of so many particles along either axis of the lattice of a body in parts one is shown.
     fn stride(&self) -> Option<usize> {
-        self.sample.as_ref().map(Sample::stride)
+        self.sample.as_ref().map(|sample| sample.stride)
     }
 
     /// The next step after `step` of which a frame is kept.
@@ -215,9 +216,9 @@ impl RunRecorder {
     }
 
     /// The frame of the end, which is exact whatever its step; of a body that was solved for at once, the way there.
-    fn finish(&mut self, scene: &Scene, engine: &Engine, is_solved: bool) {
+    fn finish(&mut self, scene: &Scene, engine: &Engine) {
         let at_end = || von_mises(Stresses::at_present(engine));
-        if is_solved {
+        if self.is_solved {
             let mut channels = self.frames.channels.clone();
             // Of an even load the page has as many parts of what it knows exactly.
             if is_linear(scene) && self.is_exact() {
@@ -269,12 +270,12 @@ impl RunRecorder {
     /// Takes the frames of the end, after which there are no others.
     pub fn close(&mut self, scene: &Scene, outcome: &Outcome) {
         self.is_solved = is_solved_at_once(scene, outcome);
-        self.finish(scene, &outcome.engine, self.is_solved);
+        self.finish(scene, &outcome.engine);
     }
 
     /// The animation of a run that is closed, for the rank that writes; of frames that are too many for a page half are let go.
     pub fn stage(&mut self, scene: &Scene, outcome: &Outcome) -> View {
-        self.view(scene, &outcome.engine, self.is_solved, self.is_exact())
+        self.view(scene, &outcome.engine, self.is_exact())
     }
 
     /// Whether the page has the final values exactly.
@@ -282,29 +283,9 @@ impl RunRecorder {
         self.sample.is_none() && self.frames.count <= MOST_EXACT
     }
 
-    /// The particles that are shown, of a body in parts.
-    pub(in crate::export) fn sample(&self) -> Option<&Sample> {
-        self.sample.as_ref()
-    }
-
-    /// A quantity of every particle in a frame, where it is kept.
-    pub(in crate::export) fn values(&self, frame: usize, quantity: &str) -> Option<Vec<f64>> {
-        let channel = self.frames.channels.iter().position(|channel| channel.name == quantity)?;
-        Some(self.frames.kept()[frame].tracks[channel].values())
-    }
-
     /// Whether frames hold a quantity of every particle.
     pub(in crate::export) fn keeps(&self, quantity: &str) -> bool {
         self.frames.channels.iter().any(|channel| channel.name == quantity)
-    }
-
-    pub(in crate::export) fn frames(&self) -> &[Frame] {
-        self.frames.kept()
-    }
-
-    /// Whether the frames are parts of the way to a rest that was solved for.
-    pub(in crate::export) fn is_solved(&self) -> bool {
-        self.is_solved
     }
 
     /// The part of the load at a frame, if frames are parts of it.
@@ -326,11 +307,12 @@ impl RunRecorder {
     #[cfg(feature = "live")]
     pub(crate) fn still(scene: &Scene, engine: &Engine) -> View {
         let mut recorder = Self::new(scene, engine, false);
-        recorder.finish(scene, engine, false);
-        recorder.view(scene, engine, false, false)
+        recorder.finish(scene, engine);
+        recorder.view(scene, engine, false)
     }
 
-    fn view(&mut self, scene: &Scene, engine: &Engine, is_solved: bool, is_exact: bool) -> View {
+    fn view(&mut self, scene: &Scene, engine: &Engine, is_exact: bool) -> View {
+        let is_solved = self.is_solved;
         let mut stage = View::new(animation(scene, engine, is_solved));
         // Stress before the last frame is kept, a part of what is exact, or computed by the page.
         let is_even = is_solved && is_exact && is_linear(scene);
@@ -348,7 +330,7 @@ impl RunRecorder {
             stage.set_reference(&sample.reference);
             stage.set_ids(sample.ids.iter().copied());
             // A dot stands for those around it as well.
-            stage.animation.spacing *= sample.stride() as f64;
+            stage.animation.spacing *= sample.stride as f64;
         } else {
             stage.set_reference(&engine.body().reference);
             if let Some(numbering) = &engine.body().numbering {
@@ -367,13 +349,9 @@ impl RunRecorder {
         if is_exact {
             add_exact(&mut stage, scene, engine);
         }
-        let encoded = encoded(&mut self.frames, stage.size());
-        let steps = self.frames.kept().iter().map(|frame| frame.step as f64);
-        let times = match is_solved {
-            true => steps.map(|step| 100.0 * step / LOAD_FRAMES as f64).collect(),
-            false => steps.collect(),
-        };
-        stage.set_frames(&self.frames, encoded, times);
+        let percent = |step: usize| 100.0 * step as f64 / LOAD_FRAMES as f64;
+        let clock = |step: usize| if is_solved { percent(step) } else { step as f64 };
+        stage.set_frames(&mut self.frames, clock);
         stage
     }
 }

@@ -136,10 +136,10 @@ fn largest_quantum(animation: &Animation) -> f64 {
     exponents.map(|(_, &exponent)| f64::from(exponent).exp2()).fold(0.0, f64::max)
 }
 
-fn facts(scene: &Scene, outcome: &Outcome, summary: &Summary) -> Vec<(String, String)> {
+fn facts(scene: &Scene, outcome: &Outcome, summary: &Summary) -> Vec<(&'static str, String)> {
     let (counts, unit) = (summary.counts, scene.unit());
     let mut facts = Vec::new();
-    let mut fact = |name: &str, value: String| facts.push((name.to_owned(), value));
+    let mut fact = |name: &'static str, value: String| facts.push((name, value));
     let roles = [
         (counts.followers, "follower"),
         (counts.leaders, "leader"),

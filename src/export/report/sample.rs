@@ -20,7 +20,8 @@ pub(in crate::export) struct Sample {
     own: Vec<usize>,
     /// How many each rank has, shape \[ranks\].
     counts: Vec<usize>,
-    stride: usize,
+    /// How many times as coarse as the body's the lattice is whose sites it takes.
+    pub stride: usize,
     /// Where they stand before they move \[length\]; of the first rank.
     pub reference: Vectors,
     /// Their ids; of the first rank.
@@ -55,10 +56,6 @@ impl Sample {
     /// Particles of all ranks.
     pub fn count(&self) -> usize {
         self.counts.iter().sum()
-    }
-
-    pub fn stride(&self) -> usize {
-        self.stride
     }
 
     /// The particles as a body, as many times as far apart as those of one with this `spacing` \[length\].
@@ -104,13 +101,12 @@ mod tests {
     use std::ops::ControlFlow;
 
     use super::super::frames::Frame;
-    use super::super::recorder::{AnimationState, LOAD_FRAMES, RunRecorder};
+    use super::super::recorder::{AnimationState, LOAD_FRAMES, RunRecorder, von_mises};
     use super::*;
     use crate::continuum::equilibrium::{run_to_equilibrium_shared, run_to_equilibrium_watched};
     use crate::continuum::mechanics::Stresses;
     use crate::continuum::plan::Plan;
     use crate::engine::observer::EachStep;
-    use crate::material::stress::StressState;
     use crate::ranks::in_process;
     use crate::scene::Scene;
     use crate::scene::bundled::bundled;
@@ -165,7 +161,7 @@ mod tests {
             let first = kept.next().expect("there is one");
             // The others have let go of what they sent.
             let is_empty = |frame: &Frame| frame.tracks.iter().all(|track| track.values().is_empty());
-            assert!(kept.all(|other| other.frames().iter().all(is_empty)));
+            assert!(kept.all(|other| other.frames.kept.iter().all(is_empty)));
             first
         })
     }
@@ -182,10 +178,7 @@ mod tests {
         };
         let plan = Plan::new(scene).expect("can be laid out");
         let end = run_to_equilibrium_watched(scene, plan, &mut EachStep(&mut see)).expect("an end").engine;
-        let size = |stress: &Option<StressState>| stress.map_or(f64::NAN, |stress| stress.von_mises);
-        let recovered = Stresses::at_present(&end)
-            .map_or_else(Vec::new, |stresses| stresses.particles.iter().map(size).collect());
-        seen.insert(END, (end.displacements(), recovered));
+        seen.insert(END, (end.displacements(), von_mises(Stresses::at_present(&end))));
         seen
     }
 
@@ -201,11 +194,11 @@ mod tests {
         ] {
             let expected = alone(&scene);
             let first = recorded(&scene, 1, None);
-            let sample = first.sample().expect("a part");
-            assert_eq!(sample.stride(), stride, "{}", scene.name);
+            let sample = first.sample.as_ref().expect("a part");
+            assert_eq!(sample.stride, stride, "{}", scene.name);
             let has_stresses = expected.values().all(|(_, stresses)| !stresses.is_empty());
-            let last = first.frames().len() - 1;
-            for (k, frame) in first.frames().iter().enumerate() {
+            let last = first.frames.kept.len() - 1;
+            for (k, frame) in first.frames.kept.iter().enumerate() {
                 // One that was solved for at once is shown on its way there, in proportion to the load.
                 let (is_solved, part) = (scene.is_solved_at_once(), frame.step as f64 / LOAD_FRAMES as f64);
                 let part = if is_solved { part } else { 1.0 };
@@ -233,7 +226,7 @@ mod tests {
             }
             let other = recorded(&scene, 3, None);
             assert!(other.animation_state() == first.animation_state(), "{}", scene.name);
-            assert_eq!(other.sample().map(|sample| &sample.ids), Some(&sample.ids));
+            assert_eq!(other.sample.as_ref().map(|sample| &sample.ids), Some(&sample.ids));
         }
     }
 
@@ -248,7 +241,7 @@ mod tests {
         }
         let grid = "body.shape={kind=\"grid\",columns=200,rows=102}";
         let first = recorded(&scene("tension", &[grid, "stop.steps=1", "frame=none"]), 3, None);
-        let sample = first.sample().expect("a part");
+        let sample = first.sample.as_ref().expect("a part");
         assert_eq!((sample.count(), sample.ids.len()), (100 * 51, 100 * 51));
         let apart =
             |of: &[f64]| of.windows(2).map(|two| two[1] - two[0]).filter(|d| *d > 0.0).collect::<Vec<_>>();
@@ -265,7 +258,7 @@ mod tests {
         };
         let first = recorded(&scene, 2, None);
         let steps =
-            |recorder: &RunRecorder| recorder.frames().iter().map(|frame| frame.step).collect::<Vec<_>>();
+            |recorder: &RunRecorder| recorder.frames.kept.iter().map(|frame| frame.step).collect::<Vec<_>>();
         let again = recorded(&scene, 3, Some(&state(&first)));
         // Their last steps are the same.
         assert_eq!(steps(&again).len(), 2 * steps(&first).len() - 1, "those of before, and its own");

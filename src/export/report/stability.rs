@@ -33,16 +33,16 @@ pub fn write(folder: &OutputFolder, study: &Study) -> Result<PathBuf, ExportErro
     page.write(folder)
 }
 
-fn facts(study: &Study) -> Vec<(String, String)> {
+fn facts(study: &Study) -> Vec<(&'static str, String)> {
     let mut facts = Vec::new();
     if let Some(linear) = &study.linear {
-        facts.push(("Followers".into(), format!("{} of {} particles", linear.followers, linear.particles)));
-        facts.push(("Spectral radius of the sweep".into(), format!("{:.9}", linear.radius)));
+        facts.push(("Followers", format!("{} of {} particles", linear.followers, linear.particles)));
+        facts.push(("Spectral radius of the sweep", format!("{:.9}", linear.radius)));
         if let Some([least, greatest]) = linear.ends {
-            facts.push(("Eigenvalues".into(), format!("from {least:.6} to {greatest:.6}")));
+            facts.push(("Eigenvalues", format!("from {least:.6} to {greatest:.6}")));
         }
     }
-    facts.extend(study.refused.iter().map(|why| ("No thresholds".to_owned(), why.clone())));
+    facts.extend(study.refused.iter().map(|why| ("No thresholds", why.clone())));
     facts
 }
 

@@ -25,11 +25,11 @@ pub fn write(folder: &OutputFolder, study: &Study) -> Result<PathBuf, ExportErro
     page.write(folder)
 }
 
-fn facts(study: &Study) -> Vec<(String, String)> {
+fn facts(study: &Study) -> Vec<(&'static str, String)> {
     let settled = study.points.iter().filter(|point| point.outcome == Outcome::Settled).count();
     vec![
-        ("Settings".into(), format!("{}, {settled} of them came to rest", study.points.len())),
-        ("Reference".into(), format!("{} nodes, {} s", study.truth_nodes, number(study.truth_seconds))),
+        ("Settings", format!("{}, {settled} of them came to rest", study.points.len())),
+        ("Reference", format!("{} nodes, {} s", study.truth_nodes, number(study.truth_seconds))),
     ]
 }
 

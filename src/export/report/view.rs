@@ -3,7 +3,8 @@
 
 use serde::Serialize;
 
-use super::encode::{EncodedFrames, GROUP, doubles, integers};
+use super::encode::{GROUP, doubles, integers};
+use super::encoded;
 use super::frames::{Channel, Frames};
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
@@ -109,12 +110,13 @@ impl View {
         Self { animation, arrays: Vec::new(), has_mean_stress: false }
     }
 
-    /// The frames, and the clock's value at each of them.
-    pub(crate) fn set_frames(&mut self, frames: &Frames, encoded: EncodedFrames, times: Vec<f64>) {
-        let tracks = || frames.kept().iter().flat_map(|frame| &frame.tracks);
+    /// The frames, as many as have room beside everything else, and the clock's value at the step of each.
+    pub(crate) fn set_frames(&mut self, frames: &mut Frames, clock: impl Fn(usize) -> f64) {
+        let encoded = encoded(frames, self.size());
+        let tracks = || frames.kept.iter().flat_map(|frame| &frame.tracks);
         let animation = &mut self.animation;
         animation.count = frames.count;
-        animation.times = times;
+        animation.times = frames.kept.iter().map(|frame| clock(frame.step)).collect();
         animation.channels = frames.channels.clone();
         animation.exponents = tracks().map(|track| track.exponent).collect();
         animation.bases = tracks().map(|track| track.base).collect();
@@ -174,7 +176,7 @@ impl View {
     }
 
     /// \[byte\]
-    pub(crate) fn size(&self) -> usize {
+    fn size(&self) -> usize {
         self.arrays.iter().map(|(_, text)| text.len()).sum()
     }
 }

@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::continuum::layout::Layout;
 pub use crate::fem::Effort;
 use crate::fem::{
     self, EstimatedError, FemError, Level, ShapeProblem, ShapeSolution, Strain, Stress, Support, solve_shape,
@@ -13,28 +14,24 @@ use crate::flock::rules::Rotation;
 use crate::flock::vectors::Vectors;
 use crate::geometry::Point;
 use crate::geometry::outline::Outline;
-use crate::geometry::partition::Partition;
 use crate::geometry::portion::Portion;
 use crate::material::elastic::{Constants, Elastic, Plane};
 use crate::material::outline_loads::Load;
+use crate::scene::Scene;
 
 /// Particles this part of the spacing outside the outline are still on it: they stand on it but for rounding.
 const OUTSIDE: f64 = 1e-3;
 
-/// A shape with what holds it and what pulls it.
+/// A shape of a scene's materials with what holds it and what pulls it.
 pub struct Setting<'a> {
+    /// The scene of the shape.
+    pub scene: &'a Scene,
+    /// The body whose particles are asked for, with the edges of inclusions where there are any.
+    pub layout: &'a Layout,
+    /// The material of the shape without its inclusions.
+    pub elastic: &'a Elastic,
     /// The outline of the shape.
     pub outline: &'a Outline,
-    /// The outline with the edges of inclusions, and what these are made of, where there are any.
-    pub inclusions: Option<(&'a Partition, &'a [Elastic])>,
-    /// Places of the particles \[length\], shape \[particles\].
-    pub reference: &'a Vectors,
-    /// Distance of neighbouring particles \[length\].
-    pub spacing: f64,
-    /// Material of the shape without its inclusions.
-    pub elastic: &'a Elastic,
-    /// Whether the body may turn far.
-    pub rotation: Rotation,
     /// Its supports and where they hold it; where supports overlap the later one holds.
     pub supports: Vec<Support<'a>>,
     /// On the outline, over the thickness of the sheet. A force on a particle acts at a point: there, and only there, the
@@ -67,15 +64,16 @@ impl Reference {
         more: Vec<(Vec<Portion>, impl Fn(Point, Point) -> Point + 'a)>,
         effort: &Effort,
     ) -> Result<Self, FemError> {
-        let Setting { outline, inclusions, reference, spacing, elastic, rotation, supports, loads } = setting;
+        let Setting { scene, layout, elastic, outline, supports, loads } = setting;
+        let (reference, spacing) = (&layout.body.reference, layout.body.lattice.spacing());
         let mut problem = ShapeProblem::new(outline, material(elastic)?);
-        if let Some((partition, elastics)) = inclusions {
-            let of_region = |(region, elastic): (&'a Outline, &Elastic)| Ok((region, material(elastic)?));
-            let all: Result<_, FemError> = partition.regions().iter().zip(elastics).map(of_region).collect();
-            problem.inclusions = all?;
+        if let Some(partition) = &layout.partition {
+            let parts = partition.regions().iter().zip(&scene.inclusions);
+            let all = parts.map(|(region, part)| Ok((region, material(&part.material)?)));
+            problem.inclusions = all.collect::<Result<_, FemError>>()?;
             problem.interfaces = partition.lines().copied().collect();
         }
-        problem.strain = match rotation {
+        problem.strain = match scene.rotation() {
             Rotation::Small => Strain::Small,
             Rotation::Corotated => Strain::Stretch,
         };
@@ -98,11 +96,6 @@ impl Reference {
             |(p, &known): (Point, &bool)| if known { found.next().unwrap_or_default() } else { beside(p) };
         let displacement = reference.iter().zip(&is_known).map(of).collect();
         Ok(Self { displacement, is_known, solution, spacing })
-    }
-
-    /// The finite-element solution itself.
-    pub fn solution(&self) -> &ShapeSolution {
-        &self.solution
     }
 
     /// The error that the truth states of itself.

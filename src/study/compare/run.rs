@@ -83,20 +83,7 @@ pub fn reference_of(scene: &Scene, effort: &Effort) -> Result<SceneReference, Sc
     let changes = layout.role_changes(scene, None)?;
     let supports = supports(scene, &layout, outline, &changes, scene.stop.steps as f64)?;
     let loads = layout.loads(scene)?;
-    let (reference, spacing) = (&layout.body.reference, layout.body.lattice.spacing());
-    let materials: Vec<Elastic> = scene.inclusions.iter().map(|part| part.material).collect();
-    let inclusions = layout.partition.as_ref().map(|partition| (partition, &materials[..]));
-    let rotation = scene.rotation();
-    let setting = Setting {
-        outline,
-        inclusions,
-        reference,
-        spacing,
-        elastic: &elastic,
-        rotation,
-        supports,
-        loads: &loads,
-    };
+    let setting = Setting { scene, layout: &layout, elastic: &elastic, outline, supports, loads: &loads };
     let solution = Reference::solve(setting, effort).map_err(|error| refused(scene, &error))?;
     require_known(scene, &solution, &changes)?;
     Ok(SceneReference { solution, layout, elastic, time: start.elapsed() })

@@ -93,7 +93,6 @@ pub(super) fn are_alike(outline: &Outline, of_cells: &Outline) -> bool {
 fn reference_of_cells(scene: &Scene, truth: &SceneReference) -> Result<Option<Vectors>, SceneError> {
     let layout = &truth.layout;
     let Some((outline, of_cells)) = outlines(layout) else { return Ok(None) };
-    let reference = &layout.body.reference;
     if are_alike(outline, &of_cells) {
         return Ok(Some(truth.solution.displacement.clone()));
     }
@@ -110,17 +109,9 @@ fn reference_of_cells(scene: &Scene, truth: &SceneReference) -> Result<Option<Ve
     }
     supports.retain(|support| !matches!(&support.on, Holding::Portions(portions) if portions.is_empty()));
     let loads = layout.loads(scene)?;
-    let spacing = layout.body.lattice.spacing();
-    let setting = Setting {
-        outline: &of_cells,
-        inclusions: None,
-        reference,
-        spacing,
-        elastic: &truth.elastic,
-        rotation: scene.rotation(),
-        supports,
-        loads: &loads.iter().filter(|load| !matches!(load, Load::Outline(_))).cloned().collect::<Vec<_>>(),
-    };
+    let others: Vec<Load> = loads.iter().filter(|load| !matches!(load, Load::Outline(_))).cloned().collect();
+    let elastic = &truth.elastic;
+    let setting = Setting { scene, layout, elastic, outline: &of_cells, supports, loads: &others };
     let pushed = loads.iter().filter_map(|load| match load {
         Load::Outline(load) => Some((carried(&load.portions, outline, &of_cells), pushed(load, outline))),
         _ => None,

@@ -171,9 +171,8 @@ impl Factor {
         match levels.windows(2).find(|pair| pair[0] == pair[1]) {
             None => Ok(levels),
             Some(pair) => {
-                let reason =
-                    format!("two of its {count} values are {}: take fewer, or a wider range", pair[0].text);
-                Err(DesignError::Vary { text: self.to_string(), reason })
+                let same = &pair[0].text;
+                self.refuse(format!("two of its {count} values are {same}: take fewer, or a wider range"))
             }
         }
     }
@@ -183,21 +182,21 @@ impl Factor {
         match &self.values {
             Values::List(levels) => Ok(levels.len()),
             Values::Range { count: Some(count), .. } => Ok(*count),
-            Values::Range { .. } => {
-                let reason = "the number of values is missing, or --samples".to_owned();
-                Err(DesignError::Vary { text: self.to_string(), reason })
-            }
+            Values::Range { .. } => self.refuse("the number of values is missing, or --samples".to_owned()),
         }
     }
 
     pub(super) fn require_open(&self) -> Result<(), DesignError> {
         match &self.values {
             Values::Range { count: Some(count), .. } => {
-                let reason = format!("--samples gives the number of values: leave the {count} out");
-                Err(DesignError::Vary { text: self.to_string(), reason })
+                self.refuse(format!("--samples gives the number of values: leave the {count} out"))
             }
             _ => Ok(()),
         }
+    }
+
+    fn refuse<T>(&self, reason: String) -> Result<T, DesignError> {
+        Err(DesignError::Vary { text: self.to_string(), reason })
     }
 }
 

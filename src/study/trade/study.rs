@@ -128,7 +128,8 @@ pub fn run(load: Load<'_>, grid: &Grid, progress: &mut dyn FnMut(&Setting)) -> R
                     continue;
                 }
                 Err(error) => {
-                    study.points.push(refused(rule, spacing, &error));
+                    let setting = Setting { rule, spacing, solver: "", tolerance: 0.0, bits: 64 };
+                    study.points.push(refused(setting, 0, &error));
                     continue;
                 }
             };
@@ -189,10 +190,9 @@ fn finest_reference(load: Load<'_>, scene: &Scene, grid: &Grid) -> Result<SceneR
     reference_of(scene, &Effort::default())
 }
 
-fn refused(rule: RuleChoice, spacing: f64, error: &SceneError) -> Point {
-    let setting = Setting { rule, spacing, solver: "", tolerance: 0.0, bits: 64 };
+fn refused(setting: Setting, particles: usize, error: &SceneError) -> Point {
     let outcome = Outcome::Refused { reason: reason(error) };
-    Point { setting, particles: 0, error: None, seconds: None, iterations: None, outcome }
+    Point { setting, particles, error: None, seconds: None, iterations: None, outcome }
 }
 
 /// The message of an error without its place, which is in an override of the study's own.
@@ -212,10 +212,7 @@ fn measure(scene: &Scene, truth: &Reference, setting: Setting, particles: usize,
         seconds.push(start.elapsed().as_secs_f64());
         match settled {
             Ok(outcome) => last = Some(outcome),
-            Err(error) => {
-                let outcome = Outcome::Refused { reason: reason(&error) };
-                return Point { setting, particles, error: None, seconds: None, iterations: None, outcome };
-            }
+            Err(error) => return refused(setting, particles, &error),
         }
     }
     let solved = last.as_ref().and_then(|outcome| outcome.solved.as_ref());

@@ -1,9 +1,5 @@
 // Frames that a session sends, in the place of those that a report holds. The other half is src/live/conductor.rs.
 
-const FRAME_KIND = 1;
-const ROLES_KIND = 2;
-const BROKEN_KIND = 3;
-
 export class LiveFrames {
   constructor(channels, count) {
     Object.assign(this, { channels, ready: 1 });
