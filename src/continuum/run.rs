@@ -359,7 +359,7 @@ pub(super) fn growth(engine: &Engine) -> Option<String> {
 
 /// The warning about a body that is stepped by a rule without forces and is not at rest yet. `residual` is its largest last move over the
 /// spacing, within `tolerance`. `None` where little is left to go if the moves go on to shrink as they do now.
-pub(crate) fn still_moving(engine: &Engine, residual: f64, tolerance: f64) -> Option<String> {
+pub fn still_moving(engine: &Engine, residual: f64, tolerance: f64) -> Option<String> {
     /// Over the spacing \[1\], and over the tolerance.
     const LITTLE: (f64, f64) = (0.01, 10.0);
     /// Over the spacing: moves that may be rounding \[1\].
