@@ -65,6 +65,21 @@ fn a_body_that_is_solved_for_is_shown_on_its_way_under_the_load() {
     assert!(html.contains("class=\"wide\"><dt>Mechanics</dt><dd>reactions, force"), "with its lines");
 }
 
+/// A body that turns far has no even parts of what it comes to.
+#[test]
+fn a_comparison_shows_increments_where_all_is_proportional() {
+    let folder = temporary();
+    for (rotation, frames) in [("small", 21), ("corotated", 2)] {
+        let mean = format!("rule.mean={{ kind = \"material\", rotation = \"{rotation}\" }}");
+        let set = ["--set", &mean, "--truth-error", "0.01", "--force", "--out", "out"];
+        done(&[&["compare", "beam-loaded"], &set[..]].concat(), folder.path());
+        let html = read_to_string(folder.path().join("out/report.html")).expect("written");
+        let film = &data(&html)["stages"][0];
+        assert_eq!(film["times"].as_array().expect("listed").len(), frames, "{rotation}");
+        assert_eq!(film["linear"].as_bool().unwrap_or(false), rotation == "small");
+    }
+}
+
 #[test]
 fn a_gallery_leads_to_the_reports_of_what_is_named() {
     let folder = temporary();

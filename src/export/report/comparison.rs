@@ -7,6 +7,7 @@ use super::super::comparison::ComparisonReport;
 use super::super::error::ExportError;
 use super::frames::{Channel, Frames};
 use super::page::{Page, Table, number, scene_text};
+use super::recorder::is_linear;
 use super::view::{Animation, Clock, Quantity, View};
 use crate::flock::vectors::Vectors;
 use crate::scene::Scene;
@@ -52,7 +53,12 @@ pub fn write(
             })
             .into(),
         note: format!(
-            "{FRAMES} equal increments of both displacements. Von Mises stresses are those at the centres of the cells, shared out to the corners; compare.csv and cells.csv have the numbers."
+            "{} Von Mises stresses are those at the centres of the cells, shared out to the corners; compare.csv and cells.csv have the numbers.",
+            match is_linear(scene) {
+                true => format!("{FRAMES} equal increments of both displacements."),
+                false =>
+                    "The reference and the end: displacements are not proportional to their cause.".into(),
+            }
         ),
         facts: facts(scene, report),
         tables: vec![measures(report)],
@@ -85,7 +91,7 @@ fn stage(
             Quantity::new("von_mises", "von Mises stress", Units::of(scene).stress),
             Quantity::new("error", "error: distance of rule and truth", unit),
         ],
-        linear: true,
+        linear: is_linear(scene),
         ..Animation::default()
     });
     stage.set_reference(&engine.body().reference);
@@ -95,14 +101,15 @@ fn stage(
     stage.add_exact(Quantity::new("uy", "y displacement", unit), moved.y.iter().copied());
     let channels = ["dx", "dy", "von_mises", "error"].map(|name| Channel { name, bits: BITS });
     let mut frames = Frames::new(moved.len(), channels.into());
-    for frame in 0..=FRAMES {
-        let part = frame as f64 / FRAMES as f64;
+    let last = if is_linear(scene) { FRAMES } else { 1 };
+    for frame in 0..=last {
+        let part = frame as f64 / last as f64;
         let scaled =
             [&moved.x[..], &moved.y, stress, error].map(|v| v.iter().map(|v| part * v).collect::<Vec<f64>>());
         let values = |k: usize, _: &Channel| (&scaled[k]).into();
-        if frame == FRAMES { frames.keep_last(frame, values) } else { frames.keep(frame, values) }
+        if frame == last { frames.keep_last(frame, values) } else { frames.keep(frame, values) }
     }
-    stage.set_frames(&mut frames, |step| 100.0 * step as f64 / FRAMES as f64);
+    stage.set_frames(&mut frames, |step| 100.0 * step as f64 / last as f64);
     stage
 }
 
