@@ -170,11 +170,14 @@ mod tests {
                    { region = { kind = \"edge\", side = \"right\" }, role = \"clamped\", from = 6 }]";
         let led = sheet.set(led).scene().expect("a scene");
         for (scene, at) in [(held, 0), (led, 5)] {
-            for is_seen in [false, true] {
+            for (is_seen, is_seen_at_once) in [(false, false), (true, false), (false, true)] {
                 let mut engine = Engine::new(Plan::new(&scene).expect("laid out").setup);
                 (0..at).for_each(|_| engine.advance());
                 let (particle, place) = (17, [9.0, 1.0]);
                 engine.lead(particle, place);
+                if is_seen_at_once {
+                    engine.observe([(particle, [7.0, 2.0])]);
+                }
                 if is_seen {
                     engine.advance();
                     engine.observe([(particle, place)]);

@@ -34,7 +34,8 @@ pub fn field(text: &str, name: &str) -> Option<u64> {
 
 /// Fewest bytes that a run of a scene takes, known before anything is laid out; 0 where its layout is refused anyway.
 pub fn at_least(scene: &Scene) -> f64 {
-    let (particles, extent) = match &scene.body {
+    let lattice = &scene.lattice;
+    let (particles, seen) = match &scene.body {
         BodySource::Points(cloud) => {
             // The lists, and what finds them anew or sweeps over them; means that are not affine are swept over as they are.
             let is_within = matches!(scene.neighbourhood, Neighbourhood::Within { .. });
@@ -43,23 +44,27 @@ pub fn at_least(scene: &Scene) -> f64 {
         }
         BodySource::Cut(Cut::Count { columns, rows }) => {
             let extent = [columns, rows].map(|&count| f64::from(count));
-            (extent[0] * extent[1], extent)
+            let inside = |far: f64, extent: f64| (1.0 - far / extent).max(0.0);
+            let seen = seen(scene, |[x, y]| inside(x, extent[0]) * inside(y, extent[1]));
+            (extent[0] * extent[1], seen)
         }
         BodySource::Cut(Cut::Shape(shape)) => {
-            let cells = |outline: Outline| outline.area() / scene.lattice.cell_area();
-            let (low, high) = scene.lattice.grid_bounds(shape.bounds());
-            (Outline::of_shape(shape).map_or(0.0, cells), [high[0] - low[0], high[1] - low[1]])
+            let Ok(outline) = Outline::of_shape(shape) else { return 0.0 };
+            let (area, length) = (outline.area(), outline.length());
+            let [a, b] = [[1, 0], [0, 1]].map(|axis| lattice.vector(axis)).map(|[x, y]| x.hypot(y));
+            // What a shape shares with itself moved by d is its area less d times half its perimeter, at least (its covariogram).
+            let seen = seen(scene, |[x, y]| (1.0 - (x * a + y * b) * length / (2.0 * area)).max(0.0));
+            (area / lattice.cell_area(), seen)
         }
     };
-    let entries = particles * seen(scene, extent);
+    let entries = particles * seen;
     let is_refused = particles > MOST_SITES as f64 || entries > MOST_ENTRIES as f64;
     if is_refused { 0.0 } else { particles * EACH as f64 + 4.0 * entries }
 }
 
-/// Others that a particle of a body of so many columns and rows sees on average, at least; at its edge they are fewer.
-fn seen(scene: &Scene, extent: [f64; 2]) -> f64 {
-    let inside = |far: i32, extent: f64| (1.0 - f64::from(far.abs()) / extent).max(0.0);
-    let share = |offset: &Site| inside(offset[0], extent[0]) * inside(offset[1], extent[1]);
+/// Others that a particle sees on average, at least, where it sees this share of those that are so many columns and rows away.
+fn seen(scene: &Scene, share: impl Fn([f64; 2]) -> f64) -> f64 {
+    let share = |offset: &Site| share(offset.map(|far| f64::from(far.abs())));
     let lists = scene.neighbourhood.offsets(&scene.lattice).unwrap_or_default();
     lists.iter().map(|list| list.iter().map(share).sum()).reduce(f64::min).unwrap_or(0.0)
 }

@@ -198,6 +198,8 @@ impl Engine {
             }
         }
         let mut guided = std::mem::take(&mut self.guided);
+        // What is put somewhere now has the last word.
+        guided.sort_by_key(|one| !one.is_there);
         guided.retain_mut(|&mut Guided { particle, place, ref mut is_there }| {
             let (was_there, has_program) = (std::mem::replace(is_there, true), self.has_program(particle));
             if !(was_there && has_program) {

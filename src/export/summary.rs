@@ -365,7 +365,7 @@ fn ended_short(scene: &Scene, outcome: &Outcome) -> Option<String> {
     };
     is_rounding.then(|| {
         format!(
-            "what rounding leaves of the stiffness of so slender a body holds it as supports do: use {other}another \
+            "what rounding leaves of the stiffness of so slender a body likely holds it as supports do: use {other}another \
              equilibrium.solver, or a wider spacing"
         )
     })

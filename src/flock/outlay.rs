@@ -157,7 +157,8 @@ impl Outlay<'_> {
             let offsets: &[Site] = if is_frame { &[] } else { &offsets[lattice.sublattice(site)] };
             offsets.iter().filter_map(move |offset| map.index([site[0] + offset[0], site[1] + offset[1]]))
         });
-        let neighbours = Neighbours::from_lists_of(about as usize, lists);
+        let entries = lists.clone().map(Iterator::count).sum();
+        let neighbours = Neighbours::from_lists_of(entries, lists);
         let frame = frame.map(|rule| Frame::build(rule, lattice, &sites, &is_frame, |site| map.index(site)));
         let lattice = lattice.clone();
         let body =

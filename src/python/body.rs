@@ -186,7 +186,7 @@ impl Body {
 
     /// Leads particles to these places in the next step: an index and a place, or as many of both.
     ///
-    /// places [length], shape (2,) or (k, 2). A clamped particle stays there; a leader goes back to its own motion.
+    /// places [length], shape (2,) or (k, 2). They stay there, but for leaders with a motion of their own.
     fn lead(&mut self, particles: &Bound<'_, PyAny>, places: &Bound<'_, PyAny>) -> PyResult<()> {
         let led = placed(Some(particles), places, self.count())?;
         led.iter().try_for_each(|&(particle, _)| self.require_led(particle))?;

@@ -213,14 +213,17 @@ impl Waves {
         }
         if let Some(limit) = self.damping_limit {
             let words = if limit < 1.0 - 1e-9 {
-                "an undamped one diverges, and edges may need less (the default has it)"
+                "an undamped one diverges"
             } else {
-                "an undamped one is at worst marginal inside, edges may need less (the default has it)"
+                "an undamped one is at worst marginal"
             };
             row(
                 f,
                 "synchronous update",
-                format_args!("damp below {limit:.6} (largest eigenvalue {:.6}): {words}", self.largest),
+                format_args!(
+                    "inside a body damp below {limit:.6} (largest eigenvalue {:.6}): {words}",
+                    self.largest
+                ),
             )?;
         }
         Ok(())

@@ -151,7 +151,7 @@ class Body:
     def lead(self, particles: ArrayLike, places: ArrayLike) -> None:
         """Leads particles to these places in the next step: an index and a place, or as many of both.
 
-        places [length], shape (2,) or (k, 2). A clamped particle stays there; a leader goes back to its own motion.
+        places [length], shape (2,) or (k, 2). They stay there, but for leaders with a motion of their own.
         """
 
     def observe(self, places: ArrayLike, particles: ArrayLike | None = None) -> None:

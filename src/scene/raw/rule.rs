@@ -236,7 +236,7 @@ pub struct RawUpdate {
     /// The order of updates within one step; all at once unless given.
     pub order: RawOrder,
     /// Part of the way to the target that is gone in one step [1]. Unless given, 1; swept synchronously, for the rule `material`, weights of
-    /// kind `gradient` and negative ones of kind `solved` nine tenths of the most at which nothing grows, for means by a power of the
+    /// kind `gradient` and negative ones of kind `solved` nine tenths of the most at which nothing overshoots and grows, for means by a power of the
     /// distance above 0 half or 1 / (1 + power), and half for `spaced` ones with a power.
     #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 2))]
     pub damping: Option<f64>,

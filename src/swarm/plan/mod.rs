@@ -349,6 +349,7 @@ fn lag(
         None => led(factor, 0)?,
     };
     let delayed = match delayed {
+        Some(_) if delay == 0 => prompt,
         Some(factor) if remembers(formation) => led(factor, delay)?,
         None => return Err(TAKES_LONG),
         Some(_) => prompt * (f64::from(delay) + 1.0),

@@ -399,9 +399,8 @@ fn demand(motion: &Motion) -> Demand {
 fn narrow(raw: &RawSwarm, formation: &Formation) -> impl Iterator<Item = String> {
     let clearance = raw.limits.clearance;
     raw.manoeuvres.iter().filter_map(move |one| {
-        let manoeuvre = formation.manoeuvre(&one.name, 0.0)?;
-        let is_narrow =
-            |(free, ..): &(f64, usize, usize)| clearance.is_some_and(|least| *free < least - ROUNDING);
+        let (least, manoeuvre) = (clearance?, formation.manoeuvre(&one.name, 0.0)?);
+        let is_narrow = |(free, ..): &(f64, usize, usize)| *free < least - ROUNDING;
         let at_places =
             narrowest(formation, &manoeuvre).filter(is_narrow).map(|found| ("at their places", found));
         let at_rest =
