@@ -12,7 +12,7 @@ use crate::flock::block::{Block, apply};
 use crate::flock::body::Body;
 use crate::flock::law::MatrixWeights;
 use crate::flock::neighbourhood::Neighbours;
-use crate::ranks::Team;
+use crate::ranks::{Team, gathered};
 
 /// Rings of neighbours around the particles along the edges that the iteration covers.
 const RINGS: usize = 2;
@@ -42,10 +42,7 @@ pub fn along_edges(
         (body.index(i), Row { is_along: is_along(i), blocks })
     };
     let own = here.into_iter().filter(|i| owned.contains(i)).map(row);
-    let rows: BTreeMap<usize, Row> = match team {
-        None => own.collect(),
-        Some(team) => team.gather_all(&own.collect::<Vec<_>>()).into_iter().collect(),
-    };
+    let rows: BTreeMap<usize, Row> = gathered(team, own.collect()).into_iter().collect();
     let along = rows.iter().filter(|(_, row)| row.is_along).map(|(&index, _)| index);
     let members = rings(along, |index| Some(rows.get(&index)?.blocks.iter().map(|(other, _)| *other)));
     if members.is_empty() {

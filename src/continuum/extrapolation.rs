@@ -6,15 +6,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use serde::{Serialize, de::DeserializeOwned};
-
 use crate::flock::body::Body;
 use crate::flock::law::{Flock, Weights};
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::role::Role;
 use crate::flock::rules::Rule;
 use crate::flock::vectors::Vectors;
-use crate::ranks::Team;
+use crate::ranks::{Team, gathered};
 use crate::solve::spectrum::LinearSweep;
 use crate::sweep::Update;
 
@@ -44,10 +42,10 @@ pub fn damping(
         Some((index, seen.zip(weights[neighbours.bonds(i)].iter().copied()).collect()))
     };
     let own = owned.clone().filter(extrapolates).map(|i| body.index(i)).collect();
-    let mut fresh: BTreeSet<usize> = of_all(team, own).into_iter().collect();
+    let mut fresh: BTreeSet<usize> = gathered(team, own).into_iter().collect();
     let mut rows: BTreeMap<usize, Vec<(usize, f64)>> = BTreeMap::new();
     for _ in 0..=RINGS {
-        let found = of_all(team, fresh.iter().filter_map(row).collect());
+        let found = gathered(team, fresh.iter().filter_map(row).collect());
         fresh = found.iter().flat_map(|(_, seen)| seen.iter().map(|(other, _)| *other)).collect();
         rows.extend(found);
         fresh.retain(|index| !rows.contains_key(index));
@@ -65,12 +63,4 @@ pub fn damping(
     let flock = Flock::new(Rule::BARYCENTRE, places, neighbours, Weights::Scalar(weights));
     let lowest = LinearSweep::new(&flock, None, &roles, Update::default(), SWEEPS)?.ends().lowest;
     Some(OF_LIMIT * 2.0 / (1.0 - lowest))
-}
-
-/// What all ranks have, in their order; what there is where there are none.
-fn of_all<T: Serialize + DeserializeOwned>(team: Option<&Team>, own: Vec<T>) -> Vec<T> {
-    match team {
-        Some(team) => team.gather_all(&own),
-        None => own,
-    }
 }

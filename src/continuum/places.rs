@@ -11,7 +11,7 @@ use crate::flock::body::{Body, Cut};
 use crate::material::cells::Cells;
 use crate::material::place::Around;
 use crate::material::stress::{AroundParticles, StressState};
-use crate::ranks::Team;
+use crate::ranks::{Team, gathered};
 use crate::scene::{BodySource, Scene, SceneError};
 
 /// Displacement and stress at a place of a body.
@@ -106,7 +106,6 @@ pub fn at_places(scene: &Scene, engine: &Engine, stresses: &Stresses) -> Vec<AtP
         let place = scene.record.places[k];
         Some((k, AtPlace { place, displacement: [ux, uy], stress: [xx, yy, xy], von_mises }))
     };
-    let own: Vec<_> = around.into_iter().enumerate().filter_map(at).collect();
-    let all = team.map_or_else(|| own.clone(), |team| team.gather_all(&own));
+    let all = gathered(team, around.into_iter().enumerate().filter_map(at).collect());
     all.into_iter().collect::<BTreeMap<_, _>>().into_values().collect()
 }

@@ -236,6 +236,14 @@ pub(crate) fn added<const N: usize>(sums: [f64; N], more: [f64; N]) -> [f64; N] 
     std::array::from_fn(|k| sums[k] + more[k])
 }
 
+/// What all ranks have, as [`Team::gather_all`]; what there is here without a team.
+pub(crate) fn gathered<T: Serialize + DeserializeOwned>(team: Option<&Team>, own: Vec<T>) -> Vec<T> {
+    match team {
+        Some(team) => team.gather_all(&own),
+        None => own,
+    }
+}
+
 fn packed(bytes: &[u8]) -> Vec<u64> {
     let word = |bytes: &[u8]| {
         let mut word = [0; 8];

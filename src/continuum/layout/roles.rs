@@ -9,7 +9,7 @@ use crate::flock::motion::Motion;
 use crate::flock::role::Role;
 use crate::flock::rules::Axis;
 use crate::flock::vectors::Vectors;
-use crate::ranks::Team;
+use crate::ranks::{Team, gathered};
 use crate::scene::{LeaderMotion, RoleEntry, Scene, SceneError};
 use crate::solve::linear::HeldComponent;
 
@@ -98,8 +98,9 @@ fn covered(changes: &[RoleChange], body: &Body, team: Option<&Team>) -> Vec<Cove
         counts.push(own);
     }
     let own = counts.concat();
-    let all = team.map_or(own.clone(), |team| team.gather_all(&own));
-    let count = |n: usize| all.iter().skip(n).step_by(own.len()).sum::<u64>();
+    let each = own.len();
+    let all = gathered(team, own);
+    let count = |n: usize| all.iter().skip(n).step_by(each).sum::<u64>();
     let covered = |(n, entry): (usize, usize)| {
         let count = |above: usize| count(n * (changes.len() + 1) + above);
         let held = (0..changes.len()).map(|above| (above, count(above))).filter(|(_, held)| *held > 0);
