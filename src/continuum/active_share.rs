@@ -3,9 +3,8 @@
 use super::plan::Plan;
 use crate::engine::setup::Setup;
 use crate::engine::several::looks_at_every_step;
-use crate::flock::neighbourhood::Neighbours;
 use crate::flock::role::Role;
-use crate::geometry::lists::lists_of;
+use crate::geometry::lists::Lists;
 use crate::sweep::Sweep;
 
 /// Share of the followers' updates that the motion of the leaders can reach within `stop.steps` \[1\]; the others
@@ -64,7 +63,7 @@ fn first_motions(plan: &Plan, steps: usize) -> Vec<usize> {
 }
 
 /// The particles that see each one: the frame sees those it serves.
-fn seen_by(plan: &Plan) -> Neighbours {
+fn seen_by(plan: &Plan) -> Lists {
     let neighbours = &plan.setup.flock.neighbours;
     let pairs = || {
         let lists = (0..plan.count()).flat_map(|j| neighbours.of(j).iter().map(move |&k| (k, j as u32)));
@@ -73,6 +72,5 @@ fn seen_by(plan: &Plan) -> Neighbours {
             .flat_map(|(frame, k)| frame.served_by(k).iter().map(move |&served| (served, frame.points[k])));
         lists.chain(served)
     };
-    let (starts, index) = lists_of(plan.count(), pairs);
-    Neighbours { starts, index }
+    Lists::sorted(plan.count(), pairs)
 }

@@ -56,13 +56,13 @@ pub(crate) fn assemble(
 
 /// The pattern of the lower triangle: two components couple if a cell holds both their nodes.
 fn pattern(mesh: &Mesh, unknown: &[Option<usize>], count: usize) -> (Vec<usize>, Vec<usize>) {
-    let (cell_starts, cells) = mesh.cells_of_nodes();
+    let cells = mesh.cells_of_nodes();
     let (mut starts, mut rows) = (Vec::with_capacity(count + 1), Vec::new());
     let mut neighbours: Vec<u32> = Vec::new();
     starts.push(0);
     for node in 0..mesh.node_count() {
         neighbours.clear();
-        for &cell in &cells[cell_starts[node] as usize..cell_starts[node + 1] as usize] {
+        for &cell in cells.of(node) {
             neighbours.extend(mesh.cell(cell as usize).iter().filter(|&&n| n as usize >= node));
         }
         neighbours.sort_unstable();

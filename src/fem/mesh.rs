@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::element::{CORNERS, NODES, Pairs, REFERENCE_NODES, Rule, Shape, side_nodes};
 use super::error::FemError;
-use crate::geometry::lists::lists_of;
+use crate::geometry::lists::Lists;
 use crate::geometry::point::bounds;
 
 /// Quadratic triangles: the nodes as parallel arrays, and those of each cell: corners counter-clockwise, then the middle of
@@ -146,10 +146,10 @@ impl Mesh {
         (mesh, at)
     }
 
-    /// For each node the cells that use it, ascending: list i is `cells[start[i]..start[i + 1]]`.
-    pub(crate) fn cells_of_nodes(&self) -> (Vec<u32>, Vec<u32>) {
+    /// For each node the cells that use it, ascending.
+    pub(crate) fn cells_of_nodes(&self) -> Lists {
         let nodes = || self.cells.as_flattened().iter().enumerate();
-        lists_of(self.node_count(), || nodes().map(|(at, &node)| (node, (at / NODES) as u32)))
+        Lists::sorted(self.node_count(), || nodes().map(|(at, &node)| (node, (at / NODES) as u32)))
     }
 }
 

@@ -29,8 +29,8 @@ impl Solution {
     pub(super) fn recovered_from(&self, rule: &Rule) -> Vec<Stress> {
         let mesh = self.mesh();
         let samples = self.samples(rule);
-        let (starts, cells) = mesh.cells_of_nodes();
-        let around = |node: usize| &cells[starts[node] as usize..starts[node + 1] as usize];
+        let cells = mesh.cells_of_nodes();
+        let around = |node: usize| cells.of(node);
         let mut sums = vec![([0.0; 4], 0.0); mesh.node_count()];
         let corners = corner_nodes(mesh);
         for vertex in (0..mesh.node_count()).filter(|&n| corners[n]) {

@@ -1,22 +1,35 @@
 //! Lists of indices: sorted, around a polygon, or many of them one after the other.
 
-/// Sorts members into so many lists, each in the order in which `pairs` has its members: where each list begins, shape
-/// \[count + 1\], and the members of all. `pairs` gives each member after its list, the same each time.
-pub(crate) fn lists_of<I: Iterator<Item = (u32, u32)>>(
-    count: usize,
-    pairs: impl Fn() -> I,
-) -> (Vec<u32>, Vec<u32>) {
-    let mut starts = vec![0; count + 1];
-    pairs().for_each(|(list, _)| starts[list as usize + 1] += 1);
-    for list in 0..count {
-        starts[list + 1] += starts[list];
+/// Many lists in compressed form.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lists {
+    /// Where each list begins, shape \[count + 1\].
+    pub(crate) starts: Vec<u32>,
+    /// The members of all.
+    pub(crate) members: Vec<u32>,
+}
+
+impl Lists {
+    /// Sorts members into so many lists, each in the order in which `pairs` has its members. `pairs` gives each member after
+    /// its list, the same each time.
+    pub(crate) fn sorted<I: Iterator<Item = (u32, u32)>>(count: usize, pairs: impl Fn() -> I) -> Self {
+        let mut starts = vec![0; count + 1];
+        pairs().for_each(|(list, _)| starts[list as usize + 1] += 1);
+        for list in 0..count {
+            starts[list + 1] += starts[list];
+        }
+        let (mut next, mut members) = (starts.clone(), vec![0; starts[count] as usize]);
+        for (list, member) in pairs() {
+            members[next[list as usize] as usize] = member;
+            next[list as usize] += 1;
+        }
+        Self { starts, members }
     }
-    let (mut next, mut members) = (starts.clone(), vec![0; starts[count] as usize]);
-    for (list, member) in pairs() {
-        members[next[list as usize] as usize] = member;
-        next[list as usize] += 1;
+
+    /// The members of one list, in its order.
+    pub fn of(&self, list: usize) -> &[u32] {
+        &self.members[self.starts[list] as usize..self.starts[list + 1] as usize]
     }
-    (starts, members)
 }
 
 /// Each of these once, ascending.

@@ -15,10 +15,8 @@ use crate::flock::vectors::Vectors;
 
 use super::boundary::{Boundary, ways};
 use super::elastic::Elastic;
-use super::stiffness::{
-    ShapeError, centroid, cut_load_shares, element_of, is_conforming, load_shares, mean_strain,
-};
-use crate::geometry::lists::{self, distinct, lists_of};
+use super::stiffness::{ShapeError, centroid, cut_load_shares, element_of, is_conforming, load_shares};
+use crate::geometry::lists::{self, Lists, distinct};
 use crate::geometry::outline::{Outline, OutlineError};
 
 /// Cells of any polygons, in compressed form. Corners run counter-clockwise.
@@ -43,19 +41,8 @@ pub struct Cells {
     pub inclusions: Vec<Elastic>,
 }
 
-/// A corner of cells at a particle: which cells, and the particle's place among their corners.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Incidence {
-    starts: Vec<u32>,
-    cell: Vec<u32>,
-}
-
-impl Incidence {
-    /// Cells that have the particle as a corner, ascending.
-    pub fn of(&self, particle: usize) -> &[u32] {
-        &self.cell[self.starts[particle] as usize..self.starts[particle + 1] as usize]
-    }
-}
+/// Of each particle the cells that have it as a corner, ascending.
+pub type Incidence = Lists;
 
 impl Cells {
     /// All cells whose corners are particles of the body and not of its frame, in the order of their
@@ -112,10 +99,14 @@ impl Cells {
 
     /// No cells yet, of the kinds that a lattice has: the cells that belong to a site, in each of so many regions.
     pub fn of_lattice(lattice: &Lattice, regions: usize) -> Self {
-        let shapes = shapes(lattice, &templates(lattice));
-        let region = (0..regions as u32).flat_map(|region| vec![region; shapes.len()]).collect();
-        let shapes = (0..regions).flat_map(|_| shapes.clone()).collect();
-        Self { region, ..Self::of_kinds(shapes) }
+        Self::of_kinds(shapes(lattice, &templates(lattice))).in_regions(regions)
+    }
+
+    /// The same with each kind in so many regions, those of the first one first.
+    fn in_regions(self, regions: usize) -> Self {
+        let region = (0..regions as u32).flat_map(|region| vec![region; self.shapes.len()]).collect();
+        let shapes: Vec<_> = (0..regions).flat_map(|_| self.shapes.clone()).collect();
+        Self { region, whole: shapes.len(), shapes, ..self }
     }
 
     /// A kind of cells that an outline has cut: corners relative to the first \[length\].
@@ -189,9 +180,7 @@ impl Cells {
         for (kind, centre) in self.kind.iter_mut().zip(centres.iter()) {
             *kind += (region(centre) * kinds) as u32;
         }
-        self.shapes = (0..regions).flat_map(|_| self.shapes.clone()).collect();
-        self.region = (0..regions as u32).flat_map(|region| vec![region; kinds]).collect();
-        self.whole = self.shapes.len();
+        *self = std::mem::replace(self, Self::of_kinds(Vec::new())).in_regions(regions);
     }
 
     /// The part of a load per area that falls to each corner of the cells of a kind \[length^2\]; see [`load_shares`].
@@ -258,8 +247,7 @@ impl Cells {
     pub fn incidence(&self, particles: usize) -> Incidence {
         let corners =
             || (0..).zip(self.iter()).flat_map(|(cell, corners)| corners.iter().map(move |&i| (i, cell)));
-        let (starts, cell) = lists_of(particles, corners);
-        Incidence { starts, cell }
+        Lists::sorted(particles, corners)
     }
 
     /// For each of `particles` particles those that it feels in this material, in order of index: those it shares a cell
@@ -325,16 +313,6 @@ impl Cells {
     /// Cells that hang together by a corner, or in several parts, have no outline.
     pub fn outline(&self, reference: &Vectors) -> Result<Outline, OutlineError> {
         Boundary::of(self, reference).outline()
-    }
-
-    /// Mean strain of each cell (xx, yy, engineering xy) \[1\] under these displacements \[length\], shape
-    /// \[count, 3\]; on a quadrilateral that is the bilinear strain at the centre.
-    pub fn strains(&self, displacement: &Vectors) -> Vec<[f64; 3]> {
-        let strain = |cell: usize| {
-            let at_corner = |k: usize| displacement.get(self.of(cell)[k] as usize);
-            mean_strain(self.shape(cell), at_corner)
-        };
-        (0..self.count()).map(strain).collect()
     }
 
     /// Centre of gravity of each cell \[length\], shape \[count\].

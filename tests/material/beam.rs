@@ -4,9 +4,11 @@ use flockform::flock::body::{Body, Cut};
 use flockform::flock::lattice::Lattice;
 use flockform::flock::law::MatrixWeights;
 use flockform::flock::neighbourhood::{Neighbourhood, Neighbours};
+use flockform::flock::rules::Rotation;
 use flockform::flock::vectors::Vectors;
 use flockform::material::cells::Cells;
 use flockform::material::elastic::Elastic;
+use flockform::material::stress;
 
 use crate::reference::beam_displacements;
 use crate::support::*;
@@ -26,7 +28,10 @@ fn end_columns(body: &Body) -> Vec<bool> {
 }
 
 fn von_mises_error(cells: &Cells, elastic: &Elastic, found: &Vectors, truth: &Vectors) -> f64 {
-    let stress = |u: &Vectors| cells.strains(u).into_iter().map(|e| elastic.von_mises(e)).collect::<Vec<_>>();
+    let stress = |u: &Vectors| {
+        let of_cells = stress::of_cells(cells, elastic, u, Rotation::Small);
+        of_cells.into_iter().map(|state| state.von_mises).collect::<Vec<_>>()
+    };
     let (found, truth) = (stress(found), stress(truth));
     let error: f64 = found.iter().zip(&truth).map(|(f, t)| (f - t).powi(2)).sum();
     (error / truth.iter().map(|t| t * t).sum::<f64>()).sqrt()

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::Operator;
 use super::matrix::{HELD, Matrix, Run};
-use crate::geometry::lists::lists_of;
+use crate::geometry::lists::Lists;
 use crate::solve::shared::{SystemPart, receive_flags};
 
 /// Sweeps to and fro before single particles are followed: almost every body is done after one.
@@ -64,12 +64,11 @@ impl Operator {
                 (0..run.len).flat_map(of)
             })
         };
-        // For each particle those that feel it, in compressed form.
-        let (starts, feels) = lists_of(reached.len(), connections);
+        // For each particle those that feel it.
+        let feels = Lists::sorted(reached.len(), connections);
         let mut fresh: Vec<u32> = (0..reached.len() as u32).filter(|&i| reached[i as usize]).collect();
         while let Some(felt) = fresh.pop() {
-            let those = starts[felt as usize] as usize..starts[felt as usize + 1] as usize;
-            for &i in &feels[those] {
+            for &i in feels.of(felt as usize) {
                 if !std::mem::replace(&mut reached[i as usize], true) {
                     fresh.push(i);
                 }
