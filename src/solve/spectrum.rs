@@ -4,7 +4,7 @@
 //! itself to displacements from a reference at zero, so no matrix is built. Frame points are part of `d`:
 //! where they lag they are what the sweep remembers of the step before, and A is not symmetric.
 
-use super::arnoldi::{Accuracy, Ritz, Wanted, eigenvalues};
+use super::arnoldi::{Accuracy, Found, Wanted, eigenvalues};
 use crate::flock::frame::Frame;
 use crate::flock::law::Flock;
 use crate::flock::role::Role;
@@ -91,7 +91,9 @@ impl<'a> LinearSweep<'a> {
 
     /// Ends of the spectrum.
     pub fn ends(&self) -> Ends {
-        let (found, iterations, converged) = self.eigenvalues((Wanted::Ends, Accuracy::Full));
+        let wanted = (Wanted::Ends, Accuracy::Full);
+        let Found { eigenvalues: found, applications: iterations, converged } =
+            self.eigenvalues(1, 0, wanted, self.most);
         // One of them only where nothing could be found at all.
         let (low, high) = (found[0].value, found[found.len() - 1].value);
         let are_real = [low, high].iter().all(|v| v.im.abs() <= 1e-9 * low.norm().max(high.norm()));
@@ -105,6 +107,19 @@ impl<'a> LinearSweep<'a> {
         const MOST_WORK: usize = 100_000_000;
         let count = self.roles.len();
         let most = self.most.min(MOST_WORK / (count * (sweeps + 50 * (delay + 1))));
+        let found = self.eigenvalues(sweeps, delay, (Wanted::Modulus, Accuracy::FromOne(1e-4)), most);
+        found.converged.then(|| found.eigenvalues[0].value.norm())
+    }
+
+    fn radius_to(&self, accuracy: Accuracy) -> SpectralRadius {
+        let Found { eigenvalues, applications: iterations, converged } =
+            self.eigenvalues(1, 0, (Wanted::Modulus, accuracy), self.most);
+        SpectralRadius { radius: eigenvalues[0].value.norm(), iterations, converged }
+    }
+
+    /// Those of a period of so many sweeps, as [`LinearSweep::delayed_radius`] has it.
+    fn eigenvalues(&self, sweeps: usize, delay: usize, wanted: (Wanted, Accuracy), most: usize) -> Found {
+        let count = self.roles.len();
         let (mut present, mut next) = (Vectors::zeros(count), Vectors::zeros(count));
         // A block of them for now and for each period back.
         let mut apply = |from: &[f64], to: &mut [f64]| {
@@ -124,30 +139,7 @@ impl<'a> LinearSweep<'a> {
         };
         let mut start = self.start();
         start.resize(2 * count * (delay + 1), 0.0);
-        let found = eigenvalues(&mut apply, start, (Wanted::Modulus, Accuracy::FromOne(1e-4)), most);
-        found.converged.then(|| found.eigenvalues[0].value.norm())
-    }
-
-    fn radius_to(&self, accuracy: Accuracy) -> SpectralRadius {
-        let (found, iterations, converged) = self.eigenvalues((Wanted::Modulus, accuracy));
-        SpectralRadius { radius: found[0].value.norm(), iterations, converged }
-    }
-
-    fn eigenvalues(&self, wanted: (Wanted, Accuracy)) -> (Vec<Ritz>, usize, bool) {
-        let count = self.roles.len();
-        let (mut present, mut next) = (Vectors::zeros(count), Vectors::zeros(count));
-        let mut apply = |from: &[f64], to: &mut [f64]| {
-            for i in 0..count {
-                present.set(i, [from[2 * i], from[2 * i + 1]]);
-            }
-            next.clone_from(&present);
-            self.sweep.step(&self.flock, self.frame, &present, &mut next);
-            for i in 0..count {
-                [to[2 * i], to[2 * i + 1]] = next.get(i);
-            }
-        };
-        let found = eigenvalues(&mut apply, self.start(), wanted, self.most);
-        (found.eigenvalues, found.applications, found.converged)
+        eigenvalues(&mut apply, start, wanted, most)
     }
 
     /// A start with a share in every mode: of no symmetry that could hide one.
