@@ -116,6 +116,23 @@ impl File {
 /// Makes the error for a key, a message and a remedy.
 pub(super) type Refuse<'a> = &'a dyn Fn(&str, String, &str) -> SceneError;
 
+/// What `parse` reads from the CSV file that stands at `key`, looked up in `folder`.
+fn read_table<T>(
+    (key, file): (&str, &str),
+    folder: Option<&Path>,
+    refuse: Refuse<'_>,
+    parse: impl FnOnce(&str) -> Result<T, String>,
+) -> Result<T, SceneError> {
+    let path = folder.unwrap_or(Path::new("")).join(file);
+    let text = text::read(&path).map_err(|error| {
+        let message = format!("cannot read {}: {error}", path.display());
+        refuse(key, message, "the path is relative to the scene file")
+    })?;
+    parse(&text).map_err(|error| {
+        refuse(key, format!("{}: {error}", path.display()), "mend the file, or name another")
+    })
+}
+
 pub(super) fn validate(
     name: &str,
     mut raw: RawScene,

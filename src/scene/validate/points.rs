@@ -2,27 +2,20 @@
 
 use std::path::Path;
 
-use super::Refuse;
 use super::material::is_material;
+use super::{Refuse, read_table};
 use crate::flock::cloud::Cloud;
 use crate::scene::document::problem::SceneError;
 use crate::scene::points::PointTable;
 use crate::scene::raw::*;
-use crate::scene::text;
 
 /// The points of the body, where it is given by them.
 pub fn cloud(raw: &RawScene, folder: Option<&Path>, refuse: Refuse<'_>) -> Result<Option<Cloud>, SceneError> {
     let RawShape::Points { file, scale } = &raw.body.shape else { return Ok(None) };
     refuse_what_needs_a_lattice(raw, refuse)?;
     let radius = radius(raw, refuse)?;
-    let (key, path) = ("body.shape.file", folder.unwrap_or(Path::new("")).join(file));
-    let text = text::read(&path).map_err(|error| {
-        let message = format!("cannot read {}: {error}", path.display());
-        refuse(key, message, "the path is relative to the scene file")
-    })?;
-    let PointTable { points, ids } = PointTable::parse(&text, *scale).map_err(|error| {
-        refuse(key, format!("{}: {error}", path.display()), "mend the file, or name another")
-    })?;
+    let parse = |text: &str| PointTable::parse(text, *scale);
+    let PointTable { points, ids } = read_table(("body.shape.file", file), folder, refuse, parse)?;
     let cloud = Cloud::new(points, ids, radius);
     cloud.map(Some).map_err(|error| refuse("neighbours.radius", error.to_string(), "use a smaller radius"))
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Refuse, ordered_box};
+use super::{Refuse, ordered_box, read_table};
 use crate::flock::condition::Condition;
 use crate::flock::motion::{Keyframe, Motion};
 use crate::flock::region::Region;
@@ -12,7 +12,6 @@ use crate::geometry::portion::{Area, Selection};
 use crate::scene::document::problem::SceneError;
 use crate::scene::raw::*;
 use crate::scene::table::DisplacementTable;
-use crate::scene::text;
 use crate::scene::{LeaderMotion, RoleEntry, SceneRegion};
 
 pub fn role_entry(
@@ -151,13 +150,8 @@ fn leader_motion(
         RawMotion::Reference { steps } => return Ok(LeaderMotion::Reference { steps: *steps }),
         RawMotion::Csv { file, scale, steps } => {
             let key = format!("{key}.motion.file");
-            let path = folder.unwrap_or(Path::new("")).join(file);
-            let help = "the path is relative to the scene file";
-            let text = text::read(&path)
-                .map_err(|error| refuse(&key, format!("cannot read {}: {error}", path.display()), help))?;
-            let rows = DisplacementTable::parse(&text, *scale).map_err(|error| {
-                refuse(&key, format!("{}: {error}", path.display()), "mend the file, or name another")
-            })?;
+            let parse = |text: &str| DisplacementTable::parse(text, *scale);
+            let rows = read_table((&key, file), folder, refuse, parse)?;
             return Ok(LeaderMotion::Table { rows, steps: *steps });
         }
     }))
