@@ -20,6 +20,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Complex, DMatrix, Matrix2, Matrix3, Vector2, Vector3};
+use serde::Serialize;
 
 use super::Block;
 use super::cells::{Cells, templates};
@@ -115,7 +116,7 @@ pub struct Effective {
 }
 
 /// Gradient length squared `l^2` \[length^2\]: positive stiffens short waves.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct GradientLength {
     /// Of waves along x that move along x.
     pub longitudinal_x: f64,

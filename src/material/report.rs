@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::Block;
 use super::elastic::{Constants, Elastic, Plane, Voigt, turned};
-use super::homogenise::{Bond, Crystal, Effective, HomogeniseError};
+use super::homogenise::{Bond, Crystal, Effective, GradientLength, HomogeniseError};
 use super::zone::Zone;
 use crate::flock::lattice::Lattice;
 
@@ -149,14 +149,9 @@ pub struct Engineering {
 /// it would in the plain continuum.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Gradient {
-    /// Of waves along x that move along x.
-    pub longitudinal_x: f64,
-    /// Of waves along x that move across it.
-    pub transverse_x: f64,
-    /// Over all directions and both polarisations.
-    pub least: f64,
-    /// Over all directions and both polarisations.
-    pub greatest: f64,
+    /// By direction and polarisation.
+    #[serde(flatten)]
+    pub length: GradientLength,
     /// The effect of the sign on short waves.
     pub effect: Effect,
 }
@@ -341,19 +336,13 @@ impl Engineering {
 
 impl Gradient {
     fn of(effective: &Effective) -> Self {
-        let found = effective.gradient;
-        let effect = match (found.least > 0.0, found.greatest < 0.0) {
+        let length = effective.gradient;
+        let effect = match (length.least > 0.0, length.greatest < 0.0) {
             (true, _) => Effect::Stiffens,
             (_, true) => Effect::Softens,
             _ => Effect::Mixed,
         };
-        Self {
-            longitudinal_x: found.longitudinal_x,
-            transverse_x: found.transverse_x,
-            least: found.least,
-            greatest: found.greatest,
-            effect,
-        }
+        Self { length, effect }
     }
 }
 

@@ -69,21 +69,17 @@ pub enum WeightsError {
 
 impl WeightsError {
     /// The same of a part of `body`, in the whole of which a particle has as many neighbours at most.
-    pub fn in_whole(self, body: &Body, most: usize) -> Self {
+    pub fn in_whole(mut self, body: &Body, most: usize) -> Self {
         let id = |particle: usize| body.id(particle - 1);
-        match self {
-            Self::MissingNeighbour { particle, missing, corners, .. } => Self::MissingNeighbour {
-                particle: id(particle),
-                missing: id(missing),
-                neighbours: most,
-                corners,
-            },
-            Self::MissingMate { particle, missing, .. } => {
-                Self::MissingMate { particle: id(particle), missing: id(missing), neighbours: most }
+        match &mut self {
+            Self::MissingNeighbour { particle, missing, neighbours, .. }
+            | Self::MissingMate { particle, missing, neighbours } => {
+                (*particle, *missing, *neighbours) = (id(*particle), id(*missing), most);
             }
-            Self::Singular { particle } => Self::Singular { particle: id(particle) },
-            other => other,
+            Self::Singular { particle } => *particle = id(*particle),
+            Self::Mechanism(_) | Self::Shape { .. } => {}
         }
+        self
     }
 }
 

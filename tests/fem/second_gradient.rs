@@ -139,7 +139,7 @@ fn the_paper_s_neighbours_of_neighbours_have_a_negative_length_squared_and_no_la
     let report = bulk_response::material(&paper).expect("a material");
     assert_eq!(report.gradient.effect, Effect::Softens);
     // A chain of the rows' sums, 3 at 1 and 1 at 2: l^2 = -(3 + 16) / (12 (3 + 4)).
-    assert!((report.gradient.longitudinal_x + 19.0 / 84.0).abs() < 1e-12);
+    assert!((report.gradient.length.longitudinal_x + 19.0 / 84.0).abs() < 1e-12);
     // Where there would be a layer the second differences change their sign from column to column.
     let profile = profile(&at_rest(&paper), 0, 0);
     let second = |k: usize| profile[k + 1].1 - 2.0 * profile[k].1 + profile[k - 1].1;

@@ -62,10 +62,14 @@ fn is_dart(faces: &Faces, corners: &[u32]) -> bool {
     corners.len() == 4 && (0..4).any(is_dent)
 }
 
+/// Length of a side \[length\].
+fn length(faces: &Faces, [a, b]: [u32; 2]) -> f64 {
+    distance(faces.nodes[a as usize].point, faces.nodes[b as usize].point)
+}
+
 /// How compact a face is: its area over the square of its circumference \[1\].
 fn compactness(faces: &Faces, corners: &[u32]) -> f64 {
-    let length = |[a, b]: [u32; 2]| distance(faces.nodes[a as usize].point, faces.nodes[b as usize].point);
-    area(faces, corners) / sides(corners).map(length).sum::<f64>().powi(2)
+    area(faces, corners) / sides(corners).map(|side| length(faces, side)).sum::<f64>().powi(2)
 }
 
 /// Joins each face that is too small, too narrow or dented with the neighbour of its region that makes the most compact face with it. By
@@ -183,9 +187,6 @@ fn shrink(faces: &mut Faces, least: f64) -> usize {
             *cells_at.entry([a.min(b), a.max(b)]).or_default() += 1;
         }
     }
-    let length = |faces: &Faces, [a, b]: [u32; 2]| {
-        distance(faces.nodes[a as usize].point, faces.nodes[b as usize].point)
-    };
     let mut short: Vec<(i64, [u32; 2])> = cells_at
         .into_iter()
         // Any other side with cells on both sides joins two strands of the outline, or a particle inside with it.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Effect, Gradient, Material, MaterialReport, Request, Waves, Weight};
+use super::{Effect, Gradient, GradientLength, Material, MaterialReport, Request, Waves, Weight};
 
 /// Width of the names of a table.
 const NAMES: usize = 26;
@@ -189,12 +189,10 @@ impl Gradient {
             Effect::Softens => "negative: softens short waves, not a second gradient",
             Effect::Mixed => "its sign depends on the direction: no second gradient",
         };
-        row(
-            f,
-            "waves along x",
-            format_args!("{} along, {} across", squared(self.longitudinal_x), squared(self.transverse_x)),
-        )?;
-        let ends = [self.least, self.greatest].map(squared);
+        let GradientLength { longitudinal_x, transverse_x, least, greatest } = self.length;
+        let [along, across] = [longitudinal_x, transverse_x].map(squared);
+        row(f, "waves along x", format_args!("{along} along, {across} across"))?;
+        let ends = [least, greatest].map(squared);
         row(f, "over all directions", format_args!("{} to {}; {words}", ends[0], ends[1]))
     }
 }
