@@ -207,10 +207,10 @@ impl Session for Monitor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::bundled::bundled_swarm;
+    use crate::swarm::examples::bundled;
 
     fn monitor() -> (Monitor, Feed, Control) {
-        let file = bundled_swarm("square").expect("bundled").load_swarm(&[]).expect("readable");
+        let file = bundled("square", &[]);
         let control = Control::new(&file).expect("laid out");
         let (monitor, feed) = Monitor::new(file, None).expect("laid out");
         (monitor, feed, control)

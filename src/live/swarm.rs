@@ -20,7 +20,7 @@ use crate::scene::swarm::raw::{RawCommand, RawCommandKind, RawFault, RawFaultKin
 use crate::scene::text::listed;
 use crate::swarm::control::Control;
 use crate::swarm::design::{self, Edit};
-use crate::swarm::flight::{Alarm, Flight, FlightCommand};
+use crate::swarm::flight::{Alarm, Flight};
 use crate::swarm::plan::Exactness;
 
 /// Quantities that come with every frame: a swarm is small.
@@ -29,7 +29,6 @@ pub(crate) const CHANNELS: [&str; 9] =
 
 /// Keys of the flight that may change while robots fly: noise, delay and loss.
 const CHANNEL_KEYS: [&str; 3] = ["flight.noise", "flight.delay", "flight.loss"];
-/// Robots that an alarm names; the page marks all of them.
 /// Most commands and faults that are kept.
 const MOST_COMMANDS: usize = 100_000;
 
@@ -135,7 +134,10 @@ impl Swarm {
         let held = hand.held.clone();
         let act = |now: &mut State| match &held {
             Held::Leaders(leaders) => now.lead_all(leaders, |[x, y]| [x + by[0], y + by[1]]),
-            Held::Obstacle(obstacle, [x, y]) => now.move_obstacle(*obstacle, [x + by[0], y + by[1]]),
+            Held::Obstacle(obstacle, [x, y]) => {
+                let what = RawCommandKind::MoveObstacle { obstacle: *obstacle, by: [x + by[0], y + by[1]] };
+                now.perform(what, "an obstacle cannot be so far away")
+            }
         };
         self.move_held(viewer, Hand { by, ..hand }, act)
     }
@@ -175,13 +177,15 @@ impl Swarm {
             _ => loss = raw.loss,
         }
         self.history.now.require_room()?;
+        let what = RawCommandKind::Channel { noise, delay, loss };
+        // Apart: of a refused channel nothing may stay.
         let mut flight = self.history.now.flight.clone();
-        if !flight.perform(&FlightCommand::Channel { noise, delay, loss }) {
+        if !flight.perform(&what) {
             return Err("the safety filter refuses this noise".into());
         }
         self.history.keep();
         self.history.now.flight = flight;
-        self.history.now.record(RawCommandKind::Channel { noise, delay, loss });
+        self.history.now.record(what);
         Ok(())
     }
 
@@ -440,7 +444,11 @@ impl State {
         if !targets.iter().all(|&(_, to)| self.flight.control().is_believed(to)) {
             return Err("poses there would not be believed: they are beyond `poses.range`".into());
         }
-        targets.into_iter().try_for_each(|(member, to)| self.lead(member, to))
+        targets.into_iter().try_for_each(|(member, to)| {
+            let robot = self.flight.control().formation().names[member].clone();
+            let refusal = "the poses there would not be believed: `poses.range` is less";
+            self.perform(RawCommandKind::Lead { robot, to }, refusal)
+        })
     }
 
     /// Places that leaders were sent to since the last period \[m\]: their targets, once the next one is flown.
@@ -454,20 +462,12 @@ impl State {
         sent.collect()
     }
 
-    fn move_obstacle(&mut self, obstacle: usize, by: [f64; 2]) -> Result<(), Refused> {
-        if !self.flight.perform(&FlightCommand::MoveObstacle { obstacle, by }) {
-            return Err("an obstacle cannot be so far away".into());
+    /// Performs a command and keeps it, or says why not.
+    fn perform(&mut self, what: RawCommandKind, refusal: &str) -> Result<(), Refused> {
+        if !self.flight.perform(&what) {
+            return Err(refusal.into());
         }
-        self.record(RawCommandKind::MoveObstacle { obstacle, by });
-        Ok(())
-    }
-
-    fn lead(&mut self, member: usize, to: [f64; 2]) -> Result<(), Refused> {
-        if !self.flight.perform(&FlightCommand::Lead { member, to }) {
-            return Err("the poses there would not be believed: `poses.range` is less".into());
-        }
-        let robot = self.flight.control().formation().names[member].clone();
-        self.record(RawCommandKind::Lead { robot, to });
+        self.record(what);
         Ok(())
     }
 

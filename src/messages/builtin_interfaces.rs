@@ -48,11 +48,6 @@ impl Duration {
         let Time { sec, nanosec } = Time::from_seconds(seconds);
         Self { sec, nanosec }
     }
-
-    /// Length in seconds.
-    pub fn seconds(self) -> f64 {
-        Time { sec: self.sec, nanosec: self.nanosec }.seconds()
-    }
 }
 
 #[cfg(test)]

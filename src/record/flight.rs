@@ -6,8 +6,8 @@ use crate::messages::builtin_interfaces::Time;
 use crate::messages::flockform_msgs::LoopEvent;
 use crate::messages::formation::diagnostics::{self, Statistics};
 use crate::messages::formation::pose::said;
-use crate::messages::formation::{NAME, markers, ranges, state, target};
-use crate::messages::geometry_msgs::{PoseStamped, PoseWithCovarianceStamped};
+use crate::messages::formation::{NAME, markers, ranges, state};
+use crate::messages::geometry_msgs::{self, PoseStamped, PoseWithCovarianceStamped};
 use crate::messages::names::{NameError, Names};
 use crate::messages::nav_msgs::Odometry;
 use crate::messages::recorder::{MessageRecorder, RecordSink};
@@ -98,7 +98,8 @@ impl FlightMessages {
             || Header { stamp: Time::from_seconds(now), frame_id: self.swarm.raw.node.frame_id.clone() };
         for (member, topic) in self.targets.iter().enumerate() {
             if let Some(target) = target_of(control, member) {
-                self.recorder.take(topic, &target::message(&target, header()), [now; 2]);
+                let pose = geometry_msgs::Pose::planar(target.position, target.yaw);
+                self.recorder.take(topic, &PoseStamped { header: header(), pose }, [now; 2]);
             }
         }
         // A simulated tick takes no time of the flight, and what it takes of ours is another every time.

@@ -22,9 +22,10 @@ use crate::messages::names::Names;
 use crate::messages::recorder::{parameters, set_parameter};
 use crate::messages::std_msgs::Header;
 use crate::scene::swarm::Swarm;
+use crate::scene::swarm::raw::RawCommand;
 use crate::swarm::control::scope::NodeScope;
 use crate::swarm::control::{Control, ControlSnapshot};
-use crate::swarm::flight::{FlightCommand, commands};
+use crate::swarm::flight::commands;
 use crate::swarm::watch::Range;
 
 /// How a replay went.
@@ -172,7 +173,7 @@ struct Replay {
     /// Whether the robots were: their time begins at 0, which says of a real one that it has none.
     is_simulated: bool,
     /// Commands from outside in the file of a simulated flight, by ascending period.
-    commands: Vec<(u64, FlightCommand)>,
+    commands: Vec<RawCommand>,
     active: bool,
     begun: bool,
     /// Poses since the last tick: member, header, pose, arrival \[s\].
@@ -215,7 +216,10 @@ impl Replay {
         let taken_over =
             described.metadata.get(TAKEN_OVER).map(|text| taken_over(reader, text)).transpose()?;
         let is_simulated = described.metadata.get("source").is_some_and(|source| source == "swarm");
-        let commands = if is_simulated { commands::of(swarm, &control)? } else { Vec::new() };
+        let commands = if is_simulated { swarm.raw.flight.commands.clone() } else { Vec::new() };
+        if is_simulated {
+            commands::check(swarm, &control)?;
+        }
         let robot = |name: &String| RobotDifference { name: name.clone(), ..RobotDifference::default() };
         Ok(Self {
             as_recorded: parameters(&before).to_vec(),
@@ -396,7 +400,7 @@ impl Replay {
         }
         for command in commands::due(&self.commands, self.ticks) {
             // What was refused is refused again.
-            command.perform(&mut self.control);
+            commands::perform(command, &mut self.control);
         }
         (self.now, self.ticks) = (now, self.ticks + 1);
         self.exact.insert(Time::from_seconds(now), now);

@@ -8,7 +8,8 @@ use rand_pcg::Pcg64Mcg;
 
 use super::watch::Pose;
 use crate::flock::splitmix;
-use crate::scene::swarm::raw::RawFlight;
+use crate::geometry::point::plus;
+use crate::scene::swarm::raw::{RawFaultKind, RawFlight};
 
 /// Parameters of a channel. The default one delivers every pose at once and unchanged.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -34,42 +35,12 @@ impl ChannelParams {
     }
 }
 
-/// The pose that a faulty robot sends in place of the true one; stamps stay true.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Lie {
-    /// So far from where it is \[m\].
-    Offset {
-        /// Along x and y.
-        by: [f64; 2],
-    },
-    /// The place at which it began to lie.
-    Frozen,
-    /// Anywhere within `radius` \[m\] of where it is.
-    Random {
-        /// Greatest distance from the true place.
-        radius: f64,
-    },
-    /// Coordinates that are no numbers.
-    NotANumber,
-}
-
-/// The kind of sender that a robot is.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Sender {
-    /// Sends its pose as it is.
-    #[default]
-    Honest,
-    /// Sends nothing; poses already on their way still arrive.
-    Dead,
-    /// Sends a pose that is none of its own.
-    Lying(Lie),
-}
-
 /// The channel of one member. Time is counted in periods, so that no rounding decides when a pose arrives.
 #[derive(Clone, Debug)]
 pub struct Channel {
     params: ChannelParams,
-    sender: Sender,
+    /// The fault of the robot that sends.
+    fault: Option<RawFaultKind>,
     /// Where the robot began to lie \[m\].
     frozen_at: Option<[f64; 2]>,
     /// A stream for each cause: what is lost does not change the noise on what is not.
@@ -96,7 +67,7 @@ impl Channel {
         let stream = |cause: u64| stream(seed, member as u64, cause);
         Self {
             params,
-            sender: Sender::Honest,
+            fault: None,
             frozen_at: None,
             noise: stream(0),
             network: stream(1),
@@ -117,20 +88,19 @@ impl Channel {
     }
 
     /// From the next pose on.
-    pub(crate) fn set_sender(&mut self, sender: Sender) {
-        if sender != self.sender {
-            self.frozen_at = None;
+    pub(crate) fn set_fault(&mut self, fault: Option<RawFaultKind>) {
+        if fault != self.fault {
+            (self.fault, self.frozen_at) = (fault, None);
         }
-        self.sender = sender;
     }
 
-    /// Sends the true pose of the robot in this period; periods must not go back.
+    /// Sends the pose of the robot in this period, the true one but for its fault; periods must not go back. Of a silent robot poses
+    /// already on their way still arrive.
     pub fn send(&mut self, period: u64, pose: Pose) {
-        let pose = match self.sender {
-            Sender::Dead => return,
-            Sender::Honest => pose,
-            Sender::Lying(lie) => self.twisted(lie, pose),
-        };
+        if matches!(self.fault, Some(RawFaultKind::Silent | RawFaultKind::Dead)) {
+            return;
+        }
+        let pose = self.by_fault(pose);
         let pose = self.noisy(pose);
         // All drawn for every pose, so that one probability does not change what another decides; one more than are needed, as
         // recorded flights have it.
@@ -167,19 +137,22 @@ impl Channel {
         Pose { position: [pose.position[0] + noise * x, pose.position[1] + noise * y], ..pose }
     }
 
-    fn twisted(&mut self, lie: Lie, pose: Pose) -> Pose {
-        let place = *self.frozen_at.get_or_insert(pose.position);
-        let moved = |by: [f64; 2]| [pose.position[0] + by[0], pose.position[1] + by[1]];
-        let position = match lie {
-            Lie::Offset { by } => moved(by),
-            Lie::Frozen => place,
-            Lie::Random { radius } => {
+    /// The pose that the robot sends in place of the true one; its stamp stays true.
+    fn by_fault(&mut self, pose: Pose) -> Pose {
+        use RawFaultKind::{Dead, Frozen, NotANumber, Offset, Random, Silent, Stuck, WrongFrame};
+        let moved = |by: [f64; 2]| plus(pose.position, by);
+        let position = match &self.fault {
+            None | Some(Silent | Dead | Stuck) => return pose,
+            Some(WrongFrame) => return Pose { frame_is_right: false, ..pose },
+            Some(Offset { by }) => moved(*by),
+            Some(Frozen) => *self.frozen_at.get_or_insert(pose.position),
+            Some(Random { within }) => {
                 // The root spreads them evenly over the disc.
                 let [far, turn] = [(); 2].map(|()| self.lies.random::<f64>());
                 let (sin, cos) = (std::f64::consts::TAU * turn).sin_cos();
-                moved([cos, sin].map(|c| radius * far.sqrt() * c))
+                moved([cos, sin].map(|c| within * far.sqrt() * c))
             }
-            Lie::NotANumber => [f64::NAN; 2],
+            Some(NotANumber) => [f64::NAN; 2],
         };
         Pose { position, ..pose }
     }
@@ -288,7 +261,7 @@ mod tests {
         let mut channel = Channel::new(ChannelParams { delay: 2, ..Default::default() }, 1, 0);
         let counts: Vec<usize> = (0..10)
             .map(|period| {
-                channel.set_sender(if (4..7).contains(&period) { Sender::Dead } else { Sender::Honest });
+                channel.set_fault((4..7).contains(&period).then_some(RawFaultKind::Dead));
                 channel.send(period, pose(period));
                 channel.deliver(period).count()
             })
@@ -298,11 +271,11 @@ mod tests {
 
     #[test]
     fn each_lie_sends_the_poses_that_it_describes() {
-        let sent = |lie| {
+        let sent = |lie: RawFaultKind| {
             let mut channel = Channel::new(ChannelParams::default(), 1, 0);
             channel.send(0, pose(0));
             (1..9).for_each(|period| {
-                channel.set_sender(Sender::Lying(lie));
+                channel.set_fault(Some(lie.clone()));
                 channel.send(period, pose(period));
             });
             let poses: Vec<Pose> = channel.deliver(9).collect();
@@ -310,10 +283,10 @@ mod tests {
             assert!(poses.iter().enumerate().all(|(k, pose)| pose.stamp == k as f64));
             poses[1..].iter().map(|pose| pose.position).collect::<Vec<_>>()
         };
-        assert_eq!(sent(Lie::Offset { by: [10.0, -2.0] })[3], [14.0, -1.0]);
-        assert_eq!(sent(Lie::Frozen), [[1.0, 1.0]; 8]);
-        assert!(sent(Lie::NotANumber).iter().all(|p| p[0].is_nan() && p[1].is_nan()));
-        let random = sent(Lie::Random { radius: 0.5 });
+        assert_eq!(sent(RawFaultKind::Offset { by: [10.0, -2.0] })[3], [14.0, -1.0]);
+        assert_eq!(sent(RawFaultKind::Frozen), [[1.0, 1.0]; 8]);
+        assert!(sent(RawFaultKind::NotANumber).iter().all(|p| p[0].is_nan() && p[1].is_nan()));
+        let random = sent(RawFaultKind::Random { within: 0.5 });
         let away = |k: usize| (random[k][0] - (k + 1) as f64).hypot(random[k][1] - 1.0);
         assert!((0..8).all(|k| away(k) <= 0.5) && away(0) != away(1));
     }

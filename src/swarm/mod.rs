@@ -20,3 +20,25 @@ pub mod safety;
 pub mod steering;
 pub mod transport;
 pub mod watch;
+
+/// Swarms for the tests of rooms that fly them.
+#[cfg(test)]
+pub(crate) mod examples {
+    use crate::scene::bundled::bundled_swarm;
+    use crate::scene::swarm::Swarm;
+
+    /// The swarm of this text, with overrides.
+    pub fn parsed(text: &str, set: &[&str]) -> Swarm {
+        Swarm::parse("x", "x.toml", text, &owned(set), None).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// A bundled swarm, with overrides.
+    pub fn bundled(name: &str, set: &[&str]) -> Swarm {
+        let found = bundled_swarm(name).expect("bundled").load_swarm(&owned(set));
+        found.unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    fn owned(set: &[&str]) -> Vec<String> {
+        set.iter().map(|&one| one.to_owned()).collect()
+    }
+}

@@ -199,6 +199,7 @@ mod tests {
 
     use super::*;
     use crate::scene::swarm::Swarm;
+    use crate::swarm::examples::parsed;
 
     /// Where the second of two robots starts, out of the way of the first.
     const FAR: [f64; 2] = [0.0, 9.0];
@@ -213,7 +214,7 @@ mod tests {
              leaders = [{{ robots = [\"a\", \"b\"], program = {{ {program} }} }}]\n\
              limits = {{ speed = 1.5, clearance = 0.3 }}\n{more}"
         );
-        Swarm::parse("drive", "drive.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"))
+        parsed(&text, &[])
     }
 
     #[test]
@@ -234,8 +235,7 @@ mod tests {
                     leaders = [{ robots = [\"a\", \"b\"], program = { kind = \"path\", points = [{ at = 1.0, displacement = [6.0, 0.0] }] } }]\n\
                     limits = { speed = 1.5, acceleration = 0.8, clearance = 0.3, geofence = [[-1.0, -1.0], [6.5, -1.0], [6.5, 5.0], [-1.0, 5.0]] }\n\
                     control = { period = 0.05 }\nflight = { model = { kind = \"double-integrator\" } }\n";
-        let swarm =
-            Swarm::parse("drive", "drive.toml", text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+        let swarm = parsed(text, &[]);
         for (stop, late) in [(None, 0), (Some(60), 0), (None, 6), (Some(60), 6)] {
             let mut control = Control::new(&swarm).expect("laid out");
             let mut steering = Steering::default();

@@ -3,7 +3,7 @@
 use flockform::messages::lifecycle_msgs;
 use flockform::messages::std_msgs::Empty;
 use flockform::ros::edge::Quality;
-use flockform::ros::edge::lifecycle::{Goal, Lifecycle, Outcome, State};
+use flockform::ros::edge::lifecycle::{Goal, Lifecycle, State};
 use ros2_client::ServiceMapping;
 
 use super::support::*;
@@ -31,12 +31,12 @@ fn a_lifecycle_is_driven_from_outside() {
     let mut done = Vec::new();
     lifecycle.autostart(1.0, &mut |goal| {
         done.push(goal);
-        Outcome::Success
+        true
     });
     assert_eq!(done, [Goal::Configure, Goal::Activate]);
     assert!(lifecycle.is_active());
 
-    let mut tick = || lifecycle.poll(2.0, &|_| true, &mut |_| Outcome::Success);
+    let mut tick = || lifecycle.poll(2.0, &|_| true, &mut |_| true);
     let current = call::<GetState>(&state, &Empty, &mut tick).current_state;
     assert_eq!(current, lifecycle_msgs::State { id: 3, label: "active".into() });
     assert_eq!(call::<GetAvailableStates>(&states, &Empty, &mut tick).available_states.len(), 11);

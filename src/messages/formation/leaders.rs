@@ -165,8 +165,7 @@ fn check_flyable(control: &Control, manoeuvre: &Manoeuvre, remedy: &str) -> Resu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::bundled::bundled_swarm;
-    use crate::scene::swarm::Swarm;
+    use crate::swarm::examples::{bundled, parsed};
 
     #[test]
     fn manoeuvres_of_the_bundled_swarms_can_be_asked_for_where_a_robot_can_fly_them() {
@@ -193,9 +192,7 @@ mod tests {
                     leaders = [{ robots = [\"a\", \"b\"], program = { kind = \"external\" } }]\n\
                     manoeuvres = [{ name = \"far\", about = [0.0, 0.0], legs = [{ seconds = 6.0, translate = [4.0, 0.0], rotate = 30.0 }] }]\n\
                     limits = { speed = 1.0, clearance = 0.3 }\n";
-        let swarm =
-            Swarm::parse("two", "two.toml", text, &[], None).unwrap_or_else(|error| panic!("{error}"));
-        let mut control = Control::new(&swarm).expect("laid out");
+        let mut control = Control::new(&parsed(text, &[])).expect("laid out");
         let led = [[5.0, 0.0], [5.0, 4.0]];
         led.into_iter().enumerate().for_each(|(m, place)| assert!(control.place_leader(m, place)));
         // Where the leaders of a formation about this point are at these times.
@@ -233,8 +230,7 @@ mod tests {
 
     #[test]
     fn a_formation_is_not_led_through_its_collapse() {
-        let swarm = bundled_swarm("square").expect("bundled").load_swarm(&[]).expect("loads");
-        let mut control = Control::new(&swarm).expect("laid out");
+        let mut control = Control::new(&bundled("square", &[])).expect("laid out");
         let mut ask = |stretch: [f64; 2], shear: [f64; 2]| {
             let request =
                 SetFormationRequest { stretch, shear, duration: 600.0, ..SetFormationRequest::default() };
@@ -258,17 +254,13 @@ mod tests {
 
     #[test]
     fn a_turn_of_many_rounds_is_refused_for_what_it_is_between_the_looks() {
-        let swarm = |set: &[&str]| {
-            let set: Vec<String> = set.iter().map(|&one| one.to_owned()).collect();
-            bundled_swarm("square").expect("bundled").load_swarm(&set).expect("loads")
-        };
+        let control = |set: &[&str]| Control::new(&bundled("square", set)).expect("laid out");
         let ask = |set: &[&str], rotate: f64, duration: f64| {
-            let mut control = Control::new(&swarm(set)).expect("laid out");
             let request =
                 SetFormationRequest { stretch: [1.0; 2], rotate, duration, ..SetFormationRequest::default() };
-            set_formation(&mut control, &request)
+            set_formation(&mut control(set), &request)
         };
-        let control = Control::new(&swarm(&[])).expect("laid out");
+        let control = control(&[]);
         let formation = control.formation();
         let reach =
             formation.places.iter().map(|place| distance(place, formation.middle())).fold(0.0, f64::max);

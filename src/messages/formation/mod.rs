@@ -8,7 +8,6 @@ pub mod markers;
 pub mod pose;
 pub mod ranges;
 pub mod state;
-pub mod target;
 
 /// Name of a formation's node unless `__node` says otherwise.
 pub const NAME: &str = "flockform";

@@ -72,7 +72,6 @@ impl RosArguments {
         let text =
             text::read(&path).map_err(|error| RosArgumentError::ReadFile { path: path.clone(), error })?;
         self.assignments.extend(parameter_file::parse(&path, &text)?);
-        self.parameter_files.push(path);
         Ok(())
     }
 }

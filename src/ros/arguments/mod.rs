@@ -33,7 +33,6 @@ mod value;
 mod yaml;
 
 use std::ffi::OsStr;
-use std::path::PathBuf;
 
 pub use crate::messages::names::{NameError, Names};
 pub use crate::messages::remap::RemapRule;
@@ -52,8 +51,6 @@ pub struct RosArguments {
     /// Parameter assignments (`-p` and the contents of `--params-file`) in the order given; the last
     /// one that matches wins.
     pub assignments: Vec<Assignment>,
-    /// Files named by `--params-file`, in the order given.
-    pub parameter_files: Vec<PathBuf>,
     /// Which messages are logged, and to where.
     pub logging: Logging,
     /// The environment variables.

@@ -6,7 +6,7 @@
 //! and a sequence number. Topics and types have the same names, so requests of both kinds arrive at one
 //! reader. Each is recognized by its own marks and answered in its own way: no setting is needed.
 
-use std::cell::{Cell, RefCell};
+use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -20,11 +20,11 @@ use super::graph::prefix;
 use super::outbox::Outlet;
 use super::participant::{Reader, Shared};
 use super::payload::Payload;
-use super::topic::{Taken, next};
+use super::topic::{Refused, Taken, next};
 use super::whole::LARGEST;
 use super::{EdgeError, Quality};
+use crate::messages::ServiceType;
 use crate::messages::wire::{BadPayload, Order, decode, encode};
-use crate::messages::{ServiceType, said};
 use crate::swarm::pace::system_time;
 
 /// Bytes before a request or reply of Cyclone DDS.
@@ -56,7 +56,7 @@ pub struct Service<S: ServiceType> {
     outlet: Arc<Outlet>,
     shared: Arc<Shared>,
     waiting: RefCell<VecDeque<Waiting<S::Request>>>,
-    refused: Cell<u64>,
+    refused: Refused,
     /// Time before which no request counts, by the clock of the system \[s\].
     from: Option<f64>,
     kind: PhantomData<S>,
@@ -75,7 +75,16 @@ impl<S: ServiceType> Service<S> {
 
     pub(super) fn new(name: String, reader: Reader, outlet: Arc<Outlet>, shared: Arc<Shared>) -> Self {
         let waiting = RefCell::new(VecDeque::new());
-        Self { name, reader, outlet, shared, waiting, refused: Cell::new(0), from: None, kind: PhantomData }
+        Self {
+            name,
+            reader,
+            outlet,
+            shared,
+            waiting,
+            refused: Refused::default(),
+            from: None,
+            kind: PhantomData,
+        }
     }
 
     /// Refuses what was sent before now. A client keeps what a server that died has not acknowledged, and sends it to the next one,
@@ -98,18 +107,19 @@ impl<S: ServiceType> Service<S> {
     }
 
     fn receive(&self) {
+        let refuse = |reason: &str| self.refused.note(&self.name, "request", reason);
         for _ in 0..MOST_AT_ONCE {
             let sample = match next(&self.reader) {
                 Taken::Nothing => return,
                 Taken::Unreadable => {
-                    self.refuse("an encoding other than plain CDR");
+                    refuse("an encoding other than plain CDR");
                     continue;
                 }
                 Taken::Sample(sample) => sample,
             };
             let before = self.from.zip(sample.stamps.sent).map_or(0.0, |(from, sent)| from - sent);
             if before > 0.0 {
-                self.refuse(&format!(
+                refuse(&format!(
                     "it was sent {before:.1} s before this server began, to an earlier one or by a clock that is behind"
                 ));
                 continue;
@@ -120,7 +130,7 @@ impl<S: ServiceType> Service<S> {
                     let asked = Waiting { since: Instant::now(), client, id, request };
                     self.waiting.borrow_mut().push_back(asked);
                 }
-                Err(error) => self.refuse(&error.to_string()),
+                Err(error) => refuse(&error.to_string()),
             }
         }
     }
@@ -165,20 +175,9 @@ impl<S: ServiceType> Service<S> {
         }
     }
 
-    fn refuse(&self, reason: &str) {
-        let before = self.refused.replace(self.refused.get() + 1);
-        if before == 0 {
-            tracing::warn!(
-                "{}: a request was refused: {} (only the first is reported)",
-                self.name,
-                said(reason)
-            );
-        }
-    }
-
     /// Requests refused since the beginning \[1\].
     pub fn refused(&self) -> u64 {
-        self.refused.get()
+        self.refused.count()
     }
 
     /// Clients elsewhere that can ask and be answered \[1\].

@@ -70,7 +70,7 @@ pub struct Subscription<M> {
     quality: Quality,
     reader: RefCell<Reader>,
     shared: Arc<Shared>,
-    refused: Cell<u64>,
+    refused: Refused,
     silence: Cell<Option<Silence>>,
     kind: PhantomData<fn() -> M>,
 }
@@ -105,7 +105,7 @@ impl<M: Message> Subscription<M> {
             node: node.to_owned(),
             quality,
             shared: shared.clone(),
-            refused: Cell::new(0),
+            refused: Refused::default(),
             silence: Cell::new(None),
             kind: PhantomData,
         })
@@ -160,14 +160,14 @@ impl<M: Message> Subscription<M> {
             let (payload, stamps) = match taken {
                 Taken::Nothing => return None,
                 Taken::Unreadable => {
-                    self.refuse("an encoding other than plain CDR");
+                    self.refused.note(&self.topic, "message", "an encoding other than plain CDR");
                     continue;
                 }
                 Taken::Sample(sample) => (sample.payload, sample.stamps),
             };
             match decode(&payload.bytes, payload.order) {
                 Ok(message) => return Some((message, stamps)),
-                Err(error) => self.refuse(&error.to_string()),
+                Err(error) => self.refused.note(&self.topic, "message", &error.to_string()),
             }
         }
         None
@@ -178,20 +178,9 @@ impl<M: Message> Subscription<M> {
         std::iter::from_fn(|| self.take()).take(MOST_AT_ONCE).last()
     }
 
-    fn refuse(&self, reason: &str) {
-        let before = self.refused.replace(self.refused.get() + 1);
-        if before == 0 {
-            tracing::warn!(
-                "{}: a message was refused: {} (only the first is reported)",
-                self.topic,
-                said(reason)
-            );
-        }
-    }
-
     /// Payloads refused since the beginning \[1\].
     pub fn refused(&self) -> u64 {
-        self.refused.get()
+        self.refused.count()
     }
 
     /// Publishers elsewhere that send to this \[1\].
@@ -212,6 +201,23 @@ impl<M: Message> Subscription<M> {
 impl<M> Drop for Subscription<M> {
     fn drop(&mut self) {
         self.shared.graph.remove_endpoint(self.reader.get_mut().guid());
+    }
+}
+
+/// Payloads of a topic or a service that were refused.
+#[derive(Default)]
+pub(super) struct Refused(Cell<u64>);
+
+impl Refused {
+    /// Counts one, and warns of the first.
+    pub fn note(&self, name: &str, what: &str, reason: &str) {
+        if self.0.replace(self.0.get() + 1) == 0 {
+            tracing::warn!("{name}: a {what} was refused: {} (only the first is reported)", said(reason));
+        }
+    }
+
+    pub fn count(&self) -> u64 {
+        self.0.get()
     }
 }
 

@@ -30,10 +30,7 @@ impl NodeSnapshot {
 impl FormationNode {
     /// The state for [`FormationNode::restore`].
     pub fn kept(&self) -> NodeSnapshot {
-        let number = |(name, value): (&str, &Value)| {
-            let whole = value.as_integer().map(|number| number as f64);
-            Some((name.to_owned(), value.as_double().or(whole)?))
-        };
+        let number = |(name, value): (&str, &Value)| Some((name.to_owned(), value.as_number()?));
         let text = |(name, value): (&str, &Value)| Some((name.to_owned(), value.as_str()?.to_owned()));
         NodeSnapshot {
             state: self.lifecycle.state().name().to_owned(),

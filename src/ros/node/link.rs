@@ -6,7 +6,7 @@ use super::pose::{PoseSource, each};
 use super::{NodeError, TopicOf, copy};
 use crate::messages::builtin_interfaces::Time;
 use crate::messages::flockform_msgs::Ranges;
-use crate::messages::formation::{pose::is_frame, ranges, target};
+use crate::messages::formation::{pose::is_frame, ranges};
 use crate::messages::geometry_msgs::{Pose, PoseArray, PoseStamped};
 use crate::messages::recorder::MessageRecorder;
 use crate::messages::said;
@@ -172,7 +172,8 @@ impl ControllerEnd for Link {
                 let mut outcome = Ok(());
                 for target in targets {
                     let Some(topic) = &topics[target.member] else { continue };
-                    let message = target::message(target, header.clone());
+                    let pose = Pose::planar(target.position, target.yaw);
+                    let message = PoseStamped { header: header.clone(), pose };
                     copy(&mut self.recorder, topic, &message, now);
                     // A failure for one member does not stop the others' targets.
                     outcome = outcome.and(topic.publish(&message));

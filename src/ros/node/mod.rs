@@ -398,8 +398,9 @@ impl FormationNode {
 
     fn apply(&mut self, changes: &[Change], now: f64) {
         for change in changes {
-            self.settings.apply(change, &mut self.control, &mut self.pace);
-            let name = if change.name == "rate" { "period" } else { &change.name };
+            let Change { name, value } = change;
+            self.settings.apply(name, value, &mut self.control, &mut self.pace);
+            let name = if name == "rate" { "period" } else { name };
             let value = recorder::parameters(&self.control).into_iter().find(|(one, _)| *one == name);
             if let Some((name, value)) = value {
                 self.record_event(now, LoopEvent::PARAMETER, name, &[value]);

@@ -7,7 +7,7 @@ use super::NodeError;
 use crate::messages::names::Names;
 use crate::messages::recorder::set_parameter;
 use crate::ros::arguments::{Parameter, RosArguments};
-use crate::ros::edge::parameters::{Change, Declaration, Store, Value};
+use crate::ros::edge::parameters::{Declaration, Store, Value};
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::RawNode;
 use crate::swarm::control::Control;
@@ -182,14 +182,13 @@ impl Settings {
         pace: &mut Pace,
     ) {
         for (name, value) in parameters {
-            self.apply(&Change { name: name.to_owned(), value: value.clone() }, control, pace);
+            self.apply(name, value, control, pace);
         }
     }
 
-    pub fn apply(&mut self, change: &Change, control: &mut Control, pace: &mut Pace) {
-        let whole = change.value.as_integer().map(|number| number as f64);
-        let Some(number) = change.value.as_double().or(whole) else { return };
-        match change.name.as_str() {
+    pub fn apply(&mut self, name: &str, value: &Value, control: &mut Control, pace: &mut Pace) {
+        let Some(number) = value.as_number() else { return };
+        match name {
             "rate" => {
                 self.rate = number;
                 pace.set_rate(number);

@@ -9,14 +9,14 @@ use std::sync::atomic::Ordering;
 
 use super::FormationNode;
 use super::endpoints::Endpoints;
-use crate::ros::edge::lifecycle::{Goal, Lifecycle, Outcome};
+use crate::ros::edge::lifecycle::{Goal, Lifecycle};
 
 impl FormationNode {
     /// Lets the lifecycle go its way at `now` \[s\], while this node performs what its transitions ask for.
     pub(super) fn follow<T>(
         &mut self,
         now: f64,
-        go: impl FnOnce(&mut Lifecycle, &mut dyn FnMut(Goal) -> Outcome) -> T,
+        go: impl FnOnce(&mut Lifecycle, &mut dyn FnMut(Goal) -> bool) -> T,
     ) -> T {
         let mut lifecycle = std::mem::take(&mut self.lifecycle);
         let done = go(&mut lifecycle, &mut |goal| self.act(goal, now));
@@ -24,18 +24,18 @@ impl FormationNode {
         done
     }
 
-    /// Performs the action of a transition.
-    fn act(&mut self, goal: Goal, now: f64) -> Outcome {
+    /// Performs the action of a transition; false where it fails.
+    fn act(&mut self, goal: Goal, now: f64) -> bool {
         match goal {
             Goal::Configure => return self.configure(),
             Goal::Activate => self.control.set_active(true),
             Goal::Deactivate | Goal::ShutDown => self.control.set_active(false),
-            Goal::CleanUp | Goal::Recover => self.clean_up(now),
+            Goal::CleanUp => self.clean_up(now),
         }
-        Outcome::Success
+        true
     }
 
-    fn configure(&mut self) -> Outcome {
+    fn configure(&mut self) -> bool {
         self.origin.take_names(&self.parameters);
         let open = || Endpoints::open(&self.origin, &self.origin.fresh);
         match self.origin.check_topics().and_then(|()| open()) {
@@ -46,12 +46,12 @@ impl FormationNode {
                 self.endpoints = Some(endpoints);
                 self.is_new = true;
                 self.is_configured.store(true, Ordering::Relaxed);
-                Outcome::Success
+                true
             }
             Err(error) => {
                 tracing::error!("not configured: {error}");
                 self.failure = Some(error);
-                Outcome::Failure
+                false
             }
         }
     }

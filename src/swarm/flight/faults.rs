@@ -4,7 +4,6 @@ use crate::flock::rounding::at_most;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::RawFaultKind;
-use crate::swarm::channel::{Lie, Sender};
 use crate::swarm::formation::Formation;
 
 #[derive(Clone, Debug)]
@@ -14,7 +13,7 @@ pub struct Fault {
     from: f64,
     /// \[s\]
     until: f64,
-    kind: RawFaultKind,
+    pub kind: RawFaultKind,
 }
 
 impl Fault {
@@ -57,19 +56,9 @@ impl Fault {
         matches!(self.kind, RawFaultKind::Dead | RawFaultKind::Stuck)
     }
 
-    pub fn is_in_wrong_frame(&self) -> bool {
-        matches!(self.kind, RawFaultKind::WrongFrame)
-    }
-
-    pub fn sender(&self) -> Sender {
-        match self.kind {
-            RawFaultKind::Silent | RawFaultKind::Dead => Sender::Dead,
-            RawFaultKind::Stuck | RawFaultKind::WrongFrame => Sender::Honest,
-            RawFaultKind::Offset { by } => Sender::Lying(Lie::Offset { by }),
-            RawFaultKind::Frozen => Sender::Lying(Lie::Frozen),
-            RawFaultKind::Random { within } => Sender::Lying(Lie::Random { radius: within }),
-            RawFaultKind::NotANumber => Sender::Lying(Lie::NotANumber),
-        }
+    /// Whether the robot sends nothing.
+    pub fn is_mute(&self) -> bool {
+        matches!(self.kind, RawFaultKind::Silent | RawFaultKind::Dead)
     }
 }
 

@@ -6,7 +6,7 @@ use crate::flock::vectors::Vectors;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::{RawFaultKind, RawModel, RawSwarm};
-use crate::swarm::channel::{Channel, ChannelParams, Sender};
+use crate::swarm::channel::{Channel, ChannelParams};
 use crate::swarm::formation::Formation;
 use crate::swarm::robots::{DoubleIntegrator, Integrator, Model, Robot, Unicycle};
 use crate::swarm::transport::Received;
@@ -134,19 +134,18 @@ impl Fleet {
     pub fn send(&mut self, stamp: f64, hear: &mut dyn FnMut(Received)) {
         self.send_ranges(stamp, hear);
         for m in 0..self.robots.len() {
-            let fault = self.fault(m);
-            let sender = fault.map(Fault::sender).unwrap_or_default();
-            let frame_is_right = !fault.is_some_and(Fault::is_in_wrong_frame);
+            let fault = self.fault(m).map(|fault| fault.kind.clone());
             let Robot { position, yaw, .. } = self.robots[m];
-            self.channels[m].set_sender(sender);
-            self.channels[m].send(self.period, Pose { position, yaw, stamp, frame_is_right });
-            self.channels[m].deliver(self.period).for_each(|pose| hear(Received::Pose(m, pose)));
+            let channel = &mut self.channels[m];
+            channel.set_fault(fault);
+            channel.send(self.period, Pose { position, yaw, stamp, frame_is_right: true });
+            channel.deliver(self.period).for_each(|pose| hear(Received::Pose(m, pose)));
         }
     }
 
     fn send_ranges(&mut self, stamp: f64, hear: &mut dyn FnMut(Received)) {
         let Some(mut rangefinders) = self.rangefinders.take() else { return };
-        let sends = |m: usize| self.fault(m).map(Fault::sender) != Some(Sender::Dead);
+        let sends = |m: usize| !self.fault(m).is_some_and(Fault::is_mute);
         if let Some(channel) = self.channels.first() {
             let measured = (self.places(), stamp);
             rangefinders

@@ -25,10 +25,10 @@ use crate::engine::Engine;
 use crate::flock::rounding::at_most;
 use crate::flock::vectors::distance;
 use crate::scene::SceneError;
+use crate::scene::swarm::raw::RawCommand;
 use crate::scene::swarm::{Shape, Swarm};
 pub use acceleration::AccelerationReport;
 pub use alarms::Alarm;
-pub use commands::FlightCommand;
 pub(super) use faults::lasts;
 pub use fleet::Fleet;
 pub use measure::{Record, Sample};
@@ -52,7 +52,7 @@ pub struct Flight {
     /// The same scene as a continuum, stepped beside the flight.
     continuum: Option<Twin>,
     /// By ascending period.
-    commands: Vec<(u64, FlightCommand)>,
+    commands: Vec<RawCommand>,
 }
 
 impl Flight {
@@ -65,9 +65,10 @@ impl Flight {
             fleet: Fleet::new(swarm, control.formation())?,
             periods: periods(swarm, &control)?,
             continuum: continuum(swarm)?,
-            commands: commands::of(swarm, &control)?,
+            commands: swarm.raw.flight.commands.clone(),
             control,
         };
+        commands::check(swarm, &flight.control)?;
         beginning::require_free(swarm, &flight)?;
         measurable::require(swarm, &flight)?;
         Ok(flight)

@@ -80,19 +80,17 @@ pub fn first_few(mut names: impl Iterator<Item = String>) -> Option<String> {
 /// Refuses places at which two robots would be closer than the swarm's own limit.
 pub fn require_apart(swarm: &Swarm, formation: &Formation) -> Result<(), SceneError> {
     let Some(clearance) = swarm.raw.limits.clearance else { return Ok(()) };
-    for i in 0..formation.count() {
-        for j in 0..i {
-            let needed = formation.radii[i] + formation.radii[j] + clearance;
-            let apart = distance(formation.places.get(i), formation.places.get(j));
-            if !at_most(needed, apart) {
-                let [apart, needed] = [apart, needed].map(rounded);
-                let message = format!(
-                    "the places of `{}` and `{}` are {apart} m apart, and their radii and the clearance need {needed} m",
-                    formation.names[j], formation.names[i]
-                );
-                let help = "widen the formation, or lower the clearance or the radius";
-                return Err(swarm.refuse("limits.clearance", message, help));
-            }
+    for (i, j) in formation.pairs() {
+        let needed = formation.radii[i] + formation.radii[j] + clearance;
+        let apart = distance(formation.places.get(i), formation.places.get(j));
+        if !at_most(needed, apart) {
+            let [apart, needed] = [apart, needed].map(rounded);
+            let message = format!(
+                "the places of `{}` and `{}` are {apart} m apart, and their radii and the clearance need {needed} m",
+                formation.names[j], formation.names[i]
+            );
+            let help = "widen the formation, or lower the clearance or the radius";
+            return Err(swarm.refuse("limits.clearance", message, help));
         }
     }
     Ok(())

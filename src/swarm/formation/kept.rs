@@ -99,9 +99,8 @@ impl Formation {
 #[cfg(test)]
 mod tests {
     use crate::flock::vectors::distance;
-    use crate::scene::bundled::bundled_swarm;
-    use crate::scene::swarm::Swarm;
     use crate::swarm::control::{Control, Mode};
+    use crate::swarm::examples::{bundled, parsed};
     use crate::swarm::watch::Pose;
 
     /// Every robot is at its target a period later.
@@ -124,9 +123,7 @@ mod tests {
                     robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [0.0, 4.0], neighbours = [\"c\"] }, \
                     { name = \"c\", place = [0.0, 8.0] }]\nleaders = [{ robots = [\"a\", \"c\"], program = { kind = \"external\" } }]\n\
                     limits = { speed = 1.0, clearance = 0.3 }\n";
-        let swarm =
-            Swarm::parse("three", "three.toml", text, &[], None).unwrap_or_else(|error| panic!("{error}"));
-        let fresh = Control::new(&swarm).expect("valid");
+        let fresh = Control::new(&parsed(text, &[])).expect("valid");
         let mut control = fresh.clone();
         let mut places = [[0.0, 0.0], [3.0, 0.0], [0.0, 8.0]];
         let mut nearest = f64::INFINITY;
@@ -155,8 +152,7 @@ mod tests {
                     leaders = [{ robots = [\"a\"], program = { kind = \"external\" } }]\n\
                     manoeuvres = [{ name = \"on\", legs = [{ seconds = 2.0, translate = [1.0, 0.0] }] }]\n\
                     limits = { speed = 1.0, clearance = 0.3 }\n";
-        let swarm =
-            Swarm::parse("two", "two.toml", text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+        let swarm = parsed(text, &[]);
         let mut control = Control::new(&swarm).expect("valid");
         fly(&mut control, 0..10);
         let on = control.formation().manoeuvre("on", control.program_time()).expect("in the file");
@@ -182,7 +178,7 @@ mod tests {
 
     #[test]
     fn a_loop_goes_on_where_another_ended() {
-        let swarm = bundled_swarm("square").expect("bundled").load_swarm(&[]).expect("valid");
+        let swarm = bundled("square", &[]);
         let mut first = Control::new(&swarm).expect("valid");
         fly(&mut first, 0..100);
         let kept = serde_json::to_string(&first.kept()).expect("plain");

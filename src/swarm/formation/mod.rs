@@ -92,6 +92,16 @@ impl Formation {
         self.spacing
     }
 
+    /// Pairs of members, each once.
+    pub(in crate::swarm) fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        (0..self.count()).flat_map(|i| (0..i).map(move |j| (i, j)))
+    }
+
+    /// Free space between the rims of two members at these places \[m\], negative where they overlap.
+    pub(in crate::swarm) fn gap(&self, places: &Vectors, a: usize, b: usize) -> f64 {
+        distance(places.get(a), places.get(b)) - self.radii[a] - self.radii[b]
+    }
+
     /// The member of this name.
     pub fn number(&self, name: &str) -> Option<usize> {
         self.names.iter().position(|known| known == name)

@@ -264,9 +264,7 @@ fn neighbours(formation: &Formation) -> f64 {
 
 /// Smallest free space between two rims at the places of the formation \[m\].
 fn free_space(formation: &Formation) -> Option<f64> {
-    let Formation { places, radii, .. } = formation;
-    let pairs = (0..formation.count()).flat_map(|i| (0..i).map(move |j| (i, j)));
-    pairs.map(|(i, j)| distance(places.get(i), places.get(j)) - radii[i] - radii[j]).reduce(f64::min)
+    formation.pairs().map(|(i, j)| formation.gap(&formation.places, i, j)).reduce(f64::min)
 }
 
 /// Noise at which two robots at their places take up all of the space between them \[m\].
@@ -282,7 +280,6 @@ fn room_for_delay(formation: &Formation, limits: &Limits) -> Option<f64> {
         return None;
     }
     let Formation { places, radii, .. } = formation;
-    let pairs = (0..formation.count()).flat_map(|i| (0..i).map(move |j| (i, j)));
     let room = |(i, j)| {
         let apart = distance(places.get(i), places.get(j));
         let keep = radii[i] + radii[j] + limits.clearance + 2.0 * limits.margin();
@@ -290,7 +287,7 @@ fn room_for_delay(formation: &Formation, limits: &Limits) -> Option<f64> {
         let off: f64 = 0.5 * ((2.0 * apart * apart - keep * keep).max(0.0).sqrt() - keep);
         off.max(0.0) / (2.0 * limits.speed)
     };
-    pairs.map(room).reduce(f64::min)
+    formation.pairs().map(room).reduce(f64::min)
 }
 
 /// The reason for which a period is no linear map, as far as the file shows it.

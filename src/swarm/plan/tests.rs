@@ -8,11 +8,14 @@ mod speed;
 use super::*;
 use crate::flock::vectors::Vectors;
 use crate::scene::bundled::bundled_swarm;
+use crate::swarm::examples::{bundled, parsed};
 
 fn plan(name: &str, set: &[&str]) -> SwarmPlan {
-    let set: Vec<String> = set.iter().map(|&one| one.to_owned()).collect();
-    let swarm = bundled_swarm(name).expect("bundled").load_swarm(&set).expect("loads");
-    SwarmPlan::new(&swarm).expect("laid out")
+    SwarmPlan::new(&bundled(name, set)).expect("laid out")
+}
+
+fn planned(text: &str, set: &[&str]) -> SwarmPlan {
+    SwarmPlan::new(&parsed(text, set)).expect("laid out")
 }
 
 #[test]
@@ -22,8 +25,7 @@ fn a_row_between_two_leaders_has_the_gain_and_the_lag_that_are_computed_by_hand(
                 { robots = [\"a\", \"c\"], program = { kind = \"external\" } }]\n\
                 robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [1.0, 0.0] }, \
                 { name = \"c\", place = [2.0, 0.0] }]\nlimits = { clearance = 0.1 }\n";
-    let swarm = Swarm::parse("three", "three.toml", text, &[], None).unwrap_or_else(|e| panic!("{e}"));
-    let plan = SwarmPlan::new(&swarm).expect("laid out");
+    let plan = planned(text, &[]);
     assert!((plan.noise.gain.expect("linear") - 0.5_f64.sqrt()).abs() < 1e-9, "{plan}");
     // Places as they were seen a period ago.
     assert!((plan.speed.lag_s.expect("linear") - plan.period_s).abs() < 1e-9, "{plan}");
@@ -73,8 +75,7 @@ fn cautions_of_two(programs: &str, more: &str) -> Vec<String> {
          robots = [{{ name = \"a\", place = [-1.0, 0.0] }}, {{ name = \"b\", place = [1.0, 0.0] }}]\n\
          leaders = [{{ robots = [\"a\", \"b\"], program = {{ {programs} }} }}]\nlimits = {{ speed = 20.0, clearance = 0.3 }}\n{more}"
     );
-    let swarm = Swarm::parse("two", "two.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"));
-    SwarmPlan::new(&swarm).expect("laid out").cautions
+    planned(&text, &[]).cautions
 }
 
 #[test]
@@ -205,8 +206,7 @@ fn steadily_led(delay: u32, limits: &str) -> Swarm {
     let text = text.replace("[resilience]\nmax_faulty_neighbours = 1\n", "");
     let path = "leaders[0].program={ kind = \"path\", points = [{ at = 40.0, displacement = [40.0, 0.0] }] }";
     let delay = format!("flight.delay={delay}");
-    let set = [path, "flight.faults=[]", &delay, limits].map(str::to_owned);
-    Swarm::parse("led", "led.toml", &text, &set, None).unwrap_or_else(|error| panic!("{error}"))
+    parsed(&text, &[path, "flight.faults=[]", &delay, limits])
 }
 
 #[test]
@@ -298,8 +298,7 @@ fn nothing_is_predicted_of_a_loop_that_is_not_linear_and_the_plan_says_why() {
     let present = "title = \"two\"\nlinks = { kind = \"present\", radius = 3.0 }\nleaders = [\
                    { robots = [\"a\"], program = { kind = \"external\" } }]\n\
                    robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [1.0, 0.0] }]\n";
-    let swarm = Swarm::parse("two", "two.toml", present, &[], None).unwrap_or_else(|e| panic!("{e}"));
-    assert!(reason(&SwarmPlan::new(&swarm).expect("laid out")).contains("anew"));
+    assert!(reason(&planned(present, &[])).contains("anew"));
     let led = SwarmPlan::new(&steadily_led(0, "limits={}")).expect("laid out");
     assert_eq!((led.convergence.is_some(), led.not_predicted), (true, None));
 }
@@ -344,10 +343,9 @@ fn solved_weights_follow_every_affine_motion_and_equal_ones_shifts_alone() {
         "limits={}",
         "flight.model={ kind = \"ideal\" }",
         "flight.bounds={}",
+        "control.sweeps=20000",
     ];
-    let slow: Vec<String> =
-        slow.iter().map(|&one| one.to_owned()).chain(["control.sweeps=20000".into()]).collect();
-    let swarm = bundled_swarm("square").expect("bundled").load_swarm(&slow).expect("loads");
+    let swarm = bundled("square", &slow);
     let mut flight = Flight::new(&swarm).expect("laid out");
     let end = swarm.raw.flight.duration.expect("a duration");
     let mut flown: f64 = 0.0;
@@ -368,8 +366,7 @@ fn where_nothing_follows_nothing_is_said_of_followers() {
     let text = "title = \"one\"\nrobots = [{ name = \"a\", place = [0.0, 0.0] }]\n\
                 links = { kind = \"nearest\", count = 1 }\n\
                 leaders = [{ robots = [\"a\"], program = { kind = \"external\" } }]\n";
-    let swarm = Swarm::parse("one", "one.toml", text, &[], None).unwrap_or_else(|e| panic!("{e}"));
-    let plan = SwarmPlan::new(&swarm).expect("laid out");
+    let plan = planned(text, &[]);
     assert_eq!(plan.exactness, None);
     let words = plan.to_string();
     assert!(!words.contains("exact") && !words.contains("lost"), "{words}");
@@ -378,9 +375,8 @@ fn where_nothing_follows_nothing_is_said_of_followers() {
 #[test]
 fn followers_are_nowhere_on_the_way_farther_off_than_the_plan_says() {
     let turn = "manoeuvres=[{ name = \"turn\", legs = [{ seconds = 70.0, rotate = 250.0 }] }]";
-    let set = ["rule={ rest = \"balanced\" }", turn].map(str::to_owned);
-    let swarm = bundled_swarm("square").expect("bundled").load_swarm(&set).expect("loads");
-    let flight = Flight::new(&swarm).expect("laid out");
+    let set = ["rule={ rest = \"balanced\" }", turn];
+    let flight = Flight::new(&bundled("square", &set)).expect("laid out");
     let formation = flight.control().formation();
     let manoeuvre = formation.manoeuvre("turn", 0.0).expect("there");
     let off = |time: f64| {
@@ -391,6 +387,6 @@ fn followers_are_nowhere_on_the_way_farther_off_than_the_plan_says() {
     };
     // Half a turn from where they were.
     let farthest = (0..=40_000).map(|k| off(70.0 * f64::from(k) / 40_000.0)).fold(0.0, f64::max);
-    let found = plan("square", &[&set[0], turn]).exactness.expect("linear").manoeuvres[0].largest;
+    let found = plan("square", &set).exactness.expect("linear").manoeuvres[0].largest;
     assert!((found / farthest - 1.0).abs() < 1e-7, "{found} beside {farthest}");
 }

@@ -103,12 +103,12 @@ impl Silence {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::bundled::bundled_swarm;
+    use crate::swarm::examples::bundled;
     use crate::swarm::watch::Pose;
 
     #[test]
     fn a_line_names_the_leaders_that_are_waited_for_and_then_the_others() {
-        let swarm = bundled_swarm("square").expect("bundled").load_swarm(&[]).expect("loads");
+        let swarm = bundled("square", &[]);
         let mut control = Control::new(&swarm).expect("laid out");
         let heard: Vec<usize> = (0..25).collect();
         let (mut silence, begun) = (Silence::default(), Instant::now());

@@ -35,9 +35,10 @@ pub struct Pose {
 
 named! {
     /// The state of a member's poses.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum Health {
         /// No pose accepted yet, or the clock has been set back.
+        #[default]
         Waiting => "waiting",
         /// Young enough to count as the present pose.
         Fresh => "fresh",
@@ -79,7 +80,7 @@ const LATE: u32 = 4;
 /// Weight of late poses that is worth a warning \[1\]: as many as 25 at once.
 const OFTEN: u32 = 25 * LATE;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Member {
     health: Health,
     /// Newest pose believed.
@@ -100,11 +101,8 @@ struct Member {
 impl Watch {
     /// All members waiting.
     pub fn new(members: usize, limits: WatchLimits) -> Self {
-        let (health, counts) = (Health::Waiting, Counts::default());
-        let (accepted, place, candidate, shortest) = (None, None, None, None);
-        let member =
-            Member { health, accepted, place, is_doubted: false, candidate, late: 0, shortest, counts };
-        Self { limits, members: vec![member; members], ranges: vec![Vec::new(); members], clock: None }
+        let (members, ranges) = (vec![Member::default(); members], vec![Vec::new(); members]);
+        Self { limits, members, ranges, clock: None }
     }
 
     /// The conditions that poses have to meet.

@@ -45,7 +45,7 @@ impl Gains {
 }
 
 /// The state of one robot, followed.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Track {
     /// At `stamp`, corrected by the pose of that time.
     robot: Robot,
@@ -56,8 +56,8 @@ pub struct Track {
     /// Bound on the error of the velocity where the last pose disagreed with the model: what the robot has done since the
     /// one before is then not known \[m/s\].
     doubt: f64,
-    /// Whether one pose alone is known, which gives no velocity.
-    is_new: bool,
+    /// Whether more than one pose is known: one alone gives no velocity.
+    has_moved_on: bool,
     /// Targets sent since, each with the time from which it holds \[s\].
     sent: VecDeque<(f64, Option<[f64; 2]>)>,
 }
@@ -78,19 +78,6 @@ const TOGETHER: f64 = 1e-6;
 
 /// Speed below which a robot is at rest, in units of what it takes up in a period \[1\].
 const AT_REST: f64 = 1e-12;
-
-impl Default for Track {
-    fn default() -> Self {
-        Self {
-            robot: Robot::at([0.0; 2], 0.0),
-            stamp: None,
-            seen: [0.0; 2],
-            doubt: 0.0,
-            is_new: true,
-            sent: VecDeque::new(),
-        }
-    }
-}
 
 impl Track {
     /// Takes in a pose that is believed; without it the robot goes on as its model does.
@@ -115,8 +102,8 @@ impl Track {
         let gains = Gains::of(dynamics.acceleration, period, deviation);
         // No robot of this model has changed its velocity by more, unless nothing was known of it.
         let change = gains.beta * off / time;
-        let share = if self.is_new { 1.0 } else { (2.0 * led / change).min(1.0) };
-        self.is_new = false;
+        let share = if self.has_moved_on { (2.0 * led / change).min(1.0) } else { 1.0 };
+        self.has_moved_on = true;
         let size = |[x, y]: [f64; 2]| x.hypot(y);
         // One whose limit has been lowered is still faster for a while.
         let fastest = dynamics.speed.max(size(self.robot.velocity));
@@ -217,7 +204,7 @@ impl Track {
         if self.stamp.is_some_and(|stamp| stamp > pose.stamp) {
             self.sent.clear();
         }
-        (self.robot, self.doubt, self.is_new) = (Robot::at(pose.position, pose.yaw), 0.0, true);
+        (self.robot, self.doubt, self.has_moved_on) = (Robot::at(pose.position, pose.yaw), 0.0, false);
         self.begin(pose, period);
     }
 

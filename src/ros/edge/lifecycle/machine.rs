@@ -91,16 +91,6 @@ pub enum Goal {
     Activate,
     Deactivate,
     ShutDown,
-    /// Put things right after an error: success leads to unconfigured, anything else to finalized.
-    Recover,
-}
-
-/// How it went.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    Success,
-    Failure,
-    Error,
 }
 
 /// Where a node stands.
@@ -141,19 +131,15 @@ impl Machine {
             State::Activating => Some(Goal::Activate),
             State::Deactivating => Some(Goal::Deactivate),
             State::ShuttingDown => Some(Goal::ShutDown),
-            State::ErrorProcessing => Some(Goal::Recover),
             _ => None,
         }
     }
 
-    /// Ends what was begun; returns the edge taken, `None` outside transition states.
-    pub fn end(&mut self, outcome: Outcome) -> Option<Transition> {
+    /// Ends what was begun, which is done or has failed; returns the edge taken, `None` outside transition states. No action of a
+    /// node of ours ends in an error, which ROS 2 has edges for as well.
+    pub fn end(&mut self, is_done: bool) -> Option<Transition> {
         self.goal()?;
-        let label = match outcome {
-            Outcome::Success => SUCCESS,
-            Outcome::Failure => FAILURE,
-            Outcome::Error => ERROR,
-        };
+        let label = if is_done { SUCCESS } else { FAILURE };
         let edge = Transition::from(self.state).find(|edge| edge.label == label)?;
         self.state = edge.goal;
         Some(edge)
@@ -164,10 +150,10 @@ impl Machine {
 mod tests {
     use super::*;
 
-    fn go(machine: &mut Machine, label: &str, outcome: Outcome) -> Option<Goal> {
+    fn go(machine: &mut Machine, label: &str, is_done: bool) -> Option<Goal> {
         let edge = machine.asked(0, label)?;
         let goal = machine.begin(edge);
-        machine.end(outcome).expect("in a transition state");
+        machine.end(is_done).expect("in a transition state");
         goal
     }
 
@@ -182,25 +168,18 @@ mod tests {
             ("shutdown", Goal::ShutDown, State::Finalized),
         ];
         for (label, goal, state) in life {
-            assert_eq!(go(&mut machine, label, Outcome::Success), Some(goal));
+            assert_eq!(go(&mut machine, label, true), Some(goal));
             assert_eq!(machine.state(), state);
         }
         assert_eq!(Transition::from(State::Finalized).count(), 0);
     }
 
     #[test]
-    fn what_fails_goes_back_and_what_errs_is_put_right_or_ends() {
+    fn what_fails_goes_back() {
         let mut machine = Machine::default();
-        go(&mut machine, "configure", Outcome::Failure);
+        go(&mut machine, "configure", false);
         assert_eq!(machine.state(), State::Unconfigured);
-        go(&mut machine, "configure", Outcome::Error);
-        assert_eq!(machine.state(), State::ErrorProcessing);
-        assert_eq!(machine.goal(), Some(Goal::Recover));
-        machine.end(Outcome::Success);
-        assert_eq!(machine.state(), State::Unconfigured);
-        go(&mut machine, "configure", Outcome::Error);
-        machine.end(Outcome::Failure);
-        assert_eq!(machine.state(), State::Finalized);
+        assert_eq!(machine.end(true), None, "nothing has begun");
     }
 
     #[test]

@@ -5,5 +5,5 @@
 mod machine;
 mod served;
 
-pub use machine::{Goal, Machine, Outcome, State, Transition};
+pub use machine::{Goal, Machine, State, Transition};
 pub use served::Lifecycle;

@@ -1,6 +1,6 @@
 //! The machine behind its services.
 
-use super::machine::{Goal, Machine, Outcome, State, Transition};
+use super::machine::{Goal, Machine, State, Transition};
 use crate::messages::lifecycle_msgs as msgs;
 use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Service};
 
@@ -69,7 +69,7 @@ impl Lifecycle {
 
     /// Takes an unconfigured node to active, doing what each step asks for. Stops where a step does not
     /// succeed.
-    pub fn autostart(&mut self, now: f64, act: &mut dyn FnMut(Goal) -> Outcome) {
+    pub fn autostart(&mut self, now: f64, act: &mut dyn FnMut(Goal) -> bool) {
         for label in ["configure", "activate"] {
             let Some(edge) = self.machine.asked(0, label) else { return };
             self.run(edge, now, act);
@@ -77,14 +77,14 @@ impl Lifecycle {
     }
 
     /// Takes the node to finalized from wherever it stands, as a signal to end does.
-    pub(crate) fn shut_down(&mut self, now: f64, act: &mut dyn FnMut(Goal) -> Outcome) {
+    pub(crate) fn shut_down(&mut self, now: f64, act: &mut dyn FnMut(Goal) -> bool) {
         if let Some(edge) = self.machine.asked(0, "shutdown") {
             self.run(edge, now, act);
         }
     }
 
     /// Takes the node to a state that it had before, by the edges that lead there.
-    pub(crate) fn go_to(&mut self, goal: State, now: f64, act: &mut dyn FnMut(Goal) -> Outcome) {
+    pub(crate) fn go_to(&mut self, goal: State, now: f64, act: &mut dyn FnMut(Goal) -> bool) {
         // No way is longer, and where there is none nothing happens.
         for _ in 0..3 {
             let label = match (self.state(), goal) {
@@ -103,12 +103,7 @@ impl Lifecycle {
     /// Answers the questions since the last tick and at most one request for a transition, so that every state lasts a
     /// tick: `act` does what the transition asks for if it `may` be asked for from outside. `now` \[s\] stamps the
     /// events.
-    pub fn poll(
-        &mut self,
-        now: f64,
-        may: &dyn Fn(&Transition) -> bool,
-        act: &mut dyn FnMut(Goal) -> Outcome,
-    ) {
+    pub fn poll(&mut self, now: f64, may: &dyn Fn(&Transition) -> bool, act: &mut dyn FnMut(Goal) -> bool) {
         if let Some((id, request)) = self.services.as_ref().and_then(|services| services.changes.take()) {
             let asked = request.transition;
             let success = self.change(asked.id, &asked.label, now, may, act);
@@ -129,25 +124,21 @@ impl Lifecycle {
         label: &str,
         now: f64,
         may: &dyn Fn(&Transition) -> bool,
-        act: &mut dyn FnMut(Goal) -> Outcome,
+        act: &mut dyn FnMut(Goal) -> bool,
     ) -> bool {
         let edge = self.machine.asked(id, label).filter(may);
         edge.is_some_and(|edge| self.run(edge, now, act))
     }
 
     /// Follows an edge to the next primary state; says whether what it asks for was done.
-    fn run(&mut self, edge: Transition, now: f64, act: &mut dyn FnMut(Goal) -> Outcome) -> bool {
+    fn run(&mut self, edge: Transition, now: f64, act: &mut dyn FnMut(Goal) -> bool) -> bool {
         let Some(goal) = self.machine.begin(edge) else { return false };
         self.publish_event(edge, now);
-        let asked = act(goal);
-        let mut outcome = asked;
-        while let Some(end) = self.machine.end(outcome) {
+        let is_done = act(goal);
+        if let Some(end) = self.machine.end(is_done) {
             self.publish_event(end, now);
-            // Only an error leads to one more thing to do: putting it right.
-            let Some(recover) = self.machine.goal() else { break };
-            outcome = act(recover);
         }
-        asked == Outcome::Success
+        is_done
     }
 
     fn publish_event(&self, edge: Transition, now: f64) {

@@ -80,6 +80,11 @@ impl Value {
         if let Value::Double(value) = self { Some(*value) } else { None }
     }
 
+    /// Of a number, whole or not.
+    pub(crate) fn as_number(&self) -> Option<f64> {
+        self.as_double().or(self.as_integer().map(|number| number as f64))
+    }
+
     pub fn as_str(&self) -> Option<&str> {
         if let Value::String(value) = self { Some(value) } else { None }
     }

@@ -110,7 +110,7 @@ pub struct RawFault {
 }
 
 /// Kinds of faults.
-#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum RawFaultKind {
     /// Moves on but sends no poses.

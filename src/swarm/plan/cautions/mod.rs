@@ -28,32 +28,21 @@ const MOST_LOOKS: usize = 1000;
 pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
     let formation = flight.control().formation();
     let raw = &swarm.raw;
-    let led = Led::by(flight);
     let one = [
         late_faults(flight, raw),
         short_faults(raw),
         hidden_fault(raw),
         late_commands(flight, raw),
         unled(flight),
-        outside(flight, "start", &|m| flight.fleet().robots()[m].position),
-        (!raw.flight.start.is_empty())
-            .then(|| outside(flight, "have their places in the formation", &|m| formation.places.get(m)))
-            .flatten(),
-        near_at_the_start(flight, raw),
-        out_of_range_at_the_start(flight, raw),
-        led_outside(flight, raw, &led),
-        led_out_of_range(flight, raw, &led),
-        in_solids(flight),
-        led_into_solids(flight),
     ];
     let fast = fast_manoeuvres(raw, formation)
         .chain(fast_paths(swarm, formation))
         .chain(leaping_paths(swarm, flight));
-    let commanded = commanded_astray(raw, flight);
     network::of(raw, flight)
         .into_iter()
         .chain(one.into_iter().flatten())
-        .chain(commanded)
+        .chain(misplaced(raw, flight))
+        .chain(commanded_astray(raw, flight))
         .chain(fast)
         .chain(narrow(raw, formation))
         .collect()
@@ -125,57 +114,64 @@ fn unled(flight: &Flight) -> Option<String> {
     ))
 }
 
-/// Robots that the fence does not hold.
-fn outside(flight: &Flight, which: &str, place: &dyn Fn(usize) -> [f64; 2]) -> Option<String> {
-    let (filter, formation) = (flight.control().filter(), flight.control().formation());
-    let names = formation.named(|m| !filter.is_fenced_in(place(m), formation.radii[m] - ROUNDING))?;
-    Some(format!(
-        "these robots {which} outside limits.geofence, in whole or in part: {names}; widen it, or move them"
-    ))
+/// Robots that start, have their places or are led where they cannot stand, or where no pose is believed.
+fn misplaced(raw: &RawSwarm, flight: &Flight) -> impl Iterator<Item = String> {
+    let (control, formation) = (flight.control(), flight.control().formation());
+    let (filter, led) = (control.filter(), Led::by(flight));
+    let radius = |m: usize| formation.radii[m] - ROUNDING;
+    let is_outside = |m: usize, place: [f64; 2]| !filter.is_fenced_in(place, radius(m));
+    let is_far = |_: usize, place: [f64; 2]| !control.is_believed(place);
+    let is_in_solid = |m: usize, place: [f64; 2]| filter.obstacles().distance(place) < radius(m);
+    let start = |m: usize| flight.fleet().robots()[m].position;
+    let home = |m: usize| formation.places.get(m);
+    let outside = |which: &str, names: String| {
+        format!(
+            "these robots {which} outside limits.geofence, in whole or in part: {names}; widen it, or move them"
+        )
+    };
+    let far = |which: &str, names: String, mend: &str| {
+        let range = number(raw.poses.range);
+        format!(
+            "{which} farther than poses.range = {range} m from the formation's middle, where no pose is believed: {names}; \
+             raise it, or {mend}"
+        )
+    };
+    let starts_elsewhere = !raw.flight.start.is_empty();
+    let all = [
+        formation.named(|m| is_outside(m, start(m))).map(|names| outside("start", names)),
+        formation
+            .named(|m| starts_elsewhere && is_outside(m, home(m)))
+            .map(|names| outside("have their places in the formation", names)),
+        near_at_the_start(flight, raw),
+        formation
+            .named(|m| is_far(m, start(m)))
+            .map(|names| far("these robots start", names, "move them")),
+        led.to(formation, &is_outside).map(|names| {
+            format!(
+                "programs lead these robots out of limits.geofence: {names}; they will stop at the fence: widen it, or change \
+                 their programs"
+            )
+        }),
+        led.to(formation, &is_far)
+            .map(|names| far("programs lead these robots", names, "change their programs")),
+        // Wherever they start.
+        formation.named(|m| is_in_solid(m, home(m))).map(|names| {
+            format!("an obstacle stands at the places of {names} in the formation; move one of them")
+        }),
+        led_into_solids(formation, &is_in_solid),
+    ];
+    all.into_iter().flatten()
 }
 
 /// Robots that begin nearer to each other than the clearance, which nothing keeps until they have moved apart.
 fn near_at_the_start(flight: &Flight, raw: &RawSwarm) -> Option<String> {
     let clearance = raw.limits.clearance?;
-    let (robots, formation) = (flight.fleet().robots(), flight.control().formation());
-    let is_near = |a: usize, b: usize| {
-        let apart = distance(robots[a].position, robots[b].position);
-        apart - formation.radii[a] - formation.radii[b] < clearance - ROUNDING
-    };
-    let is_beside_another = |m: usize| (0..robots.len()).any(|other| other != m && is_near(m, other));
+    let (places, formation) = (flight.fleet().places(), flight.control().formation());
+    let is_near = |a: usize, b: usize| formation.gap(&places, a, b) < clearance - ROUNDING;
+    let is_beside_another = |m: usize| (0..places.len()).any(|other| other != m && is_near(m, other));
     let names = formation.named(is_beside_another)?;
     Some(format!(
         "these robots start nearer to another than limits.clearance: {names}; move them, or lower it"
-    ))
-}
-
-fn out_of_range_at_the_start(flight: &Flight, raw: &RawSwarm) -> Option<String> {
-    let (control, robots) = (flight.control(), flight.fleet().robots());
-    let names = control.formation().named(|m| !control.is_believed(robots[m].position))?;
-    Some(format!(
-        "these robots start farther than poses.range = {} m from the formation's middle, where no pose is believed: {names}; \
-         raise it, or move them",
-        number(raw.poses.range)
-    ))
-}
-
-fn led_outside(flight: &Flight, raw: &RawSwarm, led: &Led) -> Option<String> {
-    raw.limits.geofence.as_ref()?;
-    let (filter, formation) = (flight.control().filter(), flight.control().formation());
-    let names = led.to(formation, &|m, place| !filter.is_fenced_in(place, formation.radii[m] - ROUNDING))?;
-    Some(format!(
-        "programs lead these robots out of limits.geofence: {names}; they will stop at the fence: widen it, or change their \
-         programs"
-    ))
-}
-
-fn led_out_of_range(flight: &Flight, raw: &RawSwarm, led: &Led) -> Option<String> {
-    let control = flight.control();
-    let names = led.to(control.formation(), &|_, place| !control.is_believed(place))?;
-    Some(format!(
-        "programs lead these robots farther than poses.range = {} m from the formation's middle, where no pose is \
-         believed: {names}; raise it, or change their programs",
-        number(raw.poses.range)
     ))
 }
 
@@ -251,24 +247,14 @@ fn looks(lead: Option<&Lead>, end: f64) -> Vec<f64> {
     ends.windows(2).flat_map(|pair| (0..=PARTS).map(move |k| part(pair, k))).collect()
 }
 
-/// Robots whose places in the formation are taken by an obstacle, wherever they start.
-fn in_solids(flight: &Flight) -> Option<String> {
-    let (obstacles, formation) = (flight.control().filter().obstacles(), flight.control().formation());
-    let overlaps = |m: usize| obstacles.distance(formation.places.get(m)) < formation.radii[m] - ROUNDING;
-    let names = formation.named(overlaps)?;
-    Some(format!("an obstacle stands at the places of {names} in the formation; move one of them"))
-}
-
-fn led_into_solids(flight: &Flight) -> Option<String> {
-    let (obstacles, formation) = (flight.control().filter().obstacles(), flight.control().formation());
+fn led_into_solids(formation: &Formation, is_in_one: &dyn Fn(usize, [f64; 2]) -> bool) -> Option<String> {
     let end = Some(formation.programs_end()).filter(|end| end.is_finite() && *end > 0.0)?;
-    let is_in_one = |place: [f64; 2], m: usize| obstacles.distance(place) < formation.radii[m] - ROUNDING;
     let at_rest = rest(formation, end);
     let place = |m: usize| match formation.led_to(m, end) {
-        None => Some(at_rest.as_ref()?.get(m)).filter(|_| !is_in_one(formation.places.get(m), m)),
+        None => Some(at_rest.as_ref()?.get(m)).filter(|_| !is_in_one(m, formation.places.get(m))),
         led => led,
     };
-    let names = formation.named(|m| place(m).is_some_and(|place| is_in_one(place, m)))?;
+    let names = formation.named(|m| place(m).is_some_and(|place| is_in_one(m, place)))?;
     Some(format!(
         "programs end with these robots' places in an obstacle, before which they will stop: {names}; move it, or \
          change their programs"
@@ -301,14 +287,8 @@ fn fast_manoeuvres<'a>(raw: &'a RawSwarm, formation: &'a Formation) -> impl Iter
 
 fn fast_paths(swarm: &Swarm, formation: &Formation) -> impl Iterator<Item = String> {
     (0..swarm.leaders.len()).filter_map(move |k| {
-        let most = |most: Demand, (_, motion): (usize, &Motion)| {
-            let asked = demand(motion);
-            Demand {
-                speed: most.speed.max(asked.speed),
-                acceleration: most.acceleration.max(asked.acceleration),
-            }
-        };
-        let words = above_limits(&swarm.raw, "a robot", motions(formation, k).fold(Demand::default(), most))?;
+        let asked = motions(formation, k).map(|(_, motion)| demand(motion)).fold(Demand::default(), larger);
+        let words = above_limits(&swarm.raw, "a robot", asked)?;
         Some(format!("the program of leaders[{k}] {words}: it will fall behind; give its points more time"))
     })
 }
@@ -367,12 +347,17 @@ fn begins_away(motion: &Motion, start: [f64; 2]) -> f64 {
     first.map_or(0.0, |first| distance(start, first.displacement))
 }
 
+/// Way \[m\] and time \[s\] from each point of a program to the next, from the robot's place on.
+fn parts(frames: &[Keyframe]) -> impl Iterator<Item = (f64, f64)> {
+    let begins = frames.iter().map(|frame| (frame.displacement, frame.step));
+    let begins = std::iter::once(([0.0; 2], 0.0)).chain(begins);
+    begins.zip(frames).map(|((from, since), to)| (distance(from, to.displacement), to.step - since))
+}
+
 /// Largest leap of a program that holds each of its points until the next \[m\].
 fn leap(motion: &Motion) -> f64 {
     let Motion::Keyframes { frames, interpolation: Interpolation::Hold } = motion else { return 0.0 };
-    let start = Keyframe { step: 0.0, displacement: [0.0; 2] };
-    let begins = std::iter::once(&start).chain(frames);
-    begins.zip(frames).map(|(from, to)| distance(from.displacement, to.displacement)).fold(0.0, f64::max)
+    parts(frames).map(|(way, _)| way).fold(0.0, f64::max)
 }
 
 /// What a program by keyframes that goes from one to the next asks of a robot; at those where its velocity leaps no acceleration.
@@ -384,15 +369,16 @@ fn demand(motion: &Motion) -> Demand {
         Interpolation::Linear => [1.0, 0.0],
         Interpolation::Smooth => [1.5, 6.0],
     };
-    let start = Keyframe { step: 0.0, displacement: [0.0; 2] };
-    let begins = std::iter::once(&start).chain(frames);
-    begins.zip(frames).filter(|(from, to)| to.step > from.step).fold(Demand::default(), |most, (from, to)| {
-        let (way, seconds) = (distance(from.displacement, to.displacement), to.step - from.step);
-        Demand {
-            speed: most.speed.max(pace * way / seconds),
-            acceleration: most.acceleration.max(gain * way / (seconds * seconds)),
-        }
-    })
+    let of_part = |(way, seconds): (f64, f64)| Demand {
+        speed: pace * way / seconds,
+        acceleration: gain * way / (seconds * seconds),
+    };
+    parts(frames).filter(|(_, seconds)| *seconds > 0.0).map(of_part).fold(Demand::default(), larger)
+}
+
+/// The larger of two speeds, and of two accelerations.
+fn larger(one: Demand, other: Demand) -> Demand {
+    Demand { speed: one.speed.max(other.speed), acceleration: one.acceleration.max(other.acceleration) }
 }
 
 /// Manoeuvres that bring two robots nearer than they may be, at their places or where followers come to rest.
@@ -428,10 +414,9 @@ fn narrowest_rest(formation: &Formation, manoeuvre: &Manoeuvre) -> Option<(f64, 
             let affine = manoeuvre.affine(begun + leg.seconds * part);
             let places = formation.places.iter().map(|place| affine.apply(place)).collect();
             let rest = formation.settled(&places).unwrap_or(places);
-            let pairs = (0..rest.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
-            let free =
-                |(i, j)| (distance(rest.get(i), rest.get(j)) - formation.radii[i] - formation.radii[j], j, i);
-            let least = pairs.map(free).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or(nearest.get());
+            let free = |(i, j)| (formation.gap(&rest, i, j), j, i);
+            let least =
+                formation.pairs().map(free).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or(nearest.get());
             if least.0 < nearest.get().0 {
                 nearest.set(least);
             }
@@ -451,15 +436,13 @@ fn narrowest(formation: &Formation, manoeuvre: &Manoeuvre) -> Option<(f64, usize
     let mut from = manoeuvre.from.shape();
     for leg in &manoeuvre.legs {
         let to = leg.posture.shape();
-        for i in 0..formation.count() {
-            for j in 0..i {
-                let way = minus(formation.places.get(i), formation.places.get(j));
-                let [begin, end] = [&from, &to].map(|shape| apply(shape, way));
-                let nearest = foot([begin, end], [0.0; 2]);
-                let free = distance(nearest, [0.0; 2]) - formation.radii[i] - formation.radii[j];
-                if least.is_none_or(|(other, ..)| free < other) {
-                    least = Some((free, j, i));
-                }
+        for (i, j) in formation.pairs() {
+            let way = minus(formation.places.get(i), formation.places.get(j));
+            let [begin, end] = [&from, &to].map(|shape| apply(shape, way));
+            let nearest = foot([begin, end], [0.0; 2]);
+            let free = distance(nearest, [0.0; 2]) - formation.radii[i] - formation.radii[j];
+            if least.is_none_or(|(other, ..)| free < other) {
+                least = Some((free, j, i));
             }
         }
         from = to;

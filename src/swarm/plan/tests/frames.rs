@@ -12,8 +12,7 @@ fn framed(frame: &str, set: &[&str]) -> Swarm {
          [control]\nsweeps = 1\n[poses]\nage_limit = 2.0\n[flight]\nduration = 60.0\nstart = [\
          {{ robot = \"robot_16\", place = [3.1, 3.05] }}, {{ robot = \"robot_10\", place = [2.05, 0.95] }}]\n"
     );
-    let set: Vec<String> = set.iter().map(|&one| one.to_owned()).collect();
-    Swarm::parse("x", "x.toml", &text, &set, None).unwrap_or_else(|error| panic!("{error}"))
+    parsed(&text, set)
 }
 
 /// What is left of the error after a period of a flight, once the slowest part of it is left alone.

@@ -10,8 +10,7 @@ fn four(d: [f64; 2]) -> SwarmPlan {
          {{ name = \"c\", place = [0.0, 2.0] }}, {{ name = \"d\", place = {d:?} }}]\n\
          leaders = [{{ robots = [\"a\", \"b\", \"c\"], program = {{ kind = \"external\" }} }}]\n"
     );
-    let swarm = Swarm::parse("x", "x.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"));
-    SwarmPlan::new(&swarm).expect("laid out")
+    planned(&text, &[])
 }
 
 #[test]

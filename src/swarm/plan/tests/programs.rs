@@ -10,9 +10,7 @@ fn a_smooth_path_is_held_against_its_own_peaks() {
              leaders = [{{ robots = [\"a\"], program = {{ kind = \"path\", interpolation = \"{kind}\", \
              points = [{{ at = 10.0, displacement = [20.0, 0.0] }}] }} }}]\nlimits = {{ {limits} }}\n"
         );
-        let swarm =
-            Swarm::parse("one", "one.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"));
-        SwarmPlan::new(&swarm).expect("laid out").cautions
+        planned(&text, &[]).cautions
     };
     // 1.5 of the mean speed in the middle, and 6 over the square of the time at the ends.
     let fast = path("smooth", "speed = 2.999");
@@ -38,8 +36,7 @@ fn followers_that_come_to_rest_beside_their_places_are_looked_at_for_space_as_we
              manoeuvres = [{{ name = \"m\", about = [3.0, 0.0], legs = [{{ seconds = 60.0, stretch = [{stretch:?}, 1.0] }}] }}]\n\
              limits = {{ speed = 1.0, clearance = 0.2 }}\n"
         );
-        let swarm = Swarm::parse("x", "x.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"));
-        SwarmPlan::new(&swarm).expect("laid out").cautions
+        planned(&text, &[]).cautions
     };
     let found = plan(0.75);
     let words = "manoeuvre `m` leaves 0.050 m between `a` and `b` where they come to rest, less than limits.clearance";
@@ -58,7 +55,7 @@ fn a_bound_on_the_affine_error_asks_for_a_manoeuvre_of_all_leaders() {
     let text = "title = \"two\"\nlinks = { kind = \"nearest\", count = 1 }\nrobots = [{ name = \"a\", place = [0.0, 0.0] }, \
                 { name = \"b\", place = [2.0, 0.0] }]\nleaders = [{ robots = [\"a\"], program = { kind = \"path\", \
                 points = [{ at = 9.0, displacement = [1.0, 0.0] }] } }]\nflight = { bounds = { affine_error = 0.1 } }\n";
-    let swarm = Swarm::parse("two", "two.toml", text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+    let swarm = parsed(text, &[]);
     let refused = SwarmPlan::new(&swarm).expect_err("not measured").to_string();
     assert!(
         refused.contains("the leaders do not all fly one manoeuvre, so no robot has a place"),

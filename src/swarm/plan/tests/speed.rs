@@ -38,8 +38,7 @@ fn led_on(set: &[&str]) -> Swarm {
         "flight.faults=[]",
         "flight.bounds={ affine_error = 0.2 }",
     ];
-    let set: Vec<String> = first.iter().chain(set).map(|&one| one.to_owned()).collect();
-    Swarm::parse("led", "led.toml", &text, &set, None).unwrap_or_else(|error| panic!("{error}"))
+    parsed(&text, &[&first[..], set].concat())
 }
 
 #[test]
@@ -179,16 +178,13 @@ fn where_no_lag_is_known_a_bound_has_no_reachable_speed_and_the_plan_says_why() 
                 robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [1.0, 0.0] }]\n\
                 manoeuvres = [{ name = \"m\", legs = [{ seconds = 9.0, translate = [9.0, 0.0] }] }]\n\
                 limits = { speed = 3.0, acceleration = 0.5 }\nflight = { bounds = { affine_error = 0.09 } }\n";
-    let swarm = Swarm::parse("two", "two.toml", text, &[], None).unwrap_or_else(|e| panic!("{e}"));
-    let plan = SwarmPlan::new(&swarm).expect("laid out");
+    let plan = planned(text, &[]);
     assert!((plan.speed.reachable.expect("bounded") - 0.3).abs() < 1e-9, "{plan}");
     let words = "manoeuvre `m` moves a robot's place at up to 1.500 m/s, and steadily led robots are within \
                  flight.bounds.affine_error = 0.09 m of their places up to 0.300 m/s";
     assert!(plan.cautions.iter().any(|one| one.contains(words)), "{plan}");
     let is_beyond = |legs: &str| {
-        let set = [format!("manoeuvres=[{{ name = \"m\", legs = [{legs}] }}]")];
-        let swarm = Swarm::parse("two", "two.toml", text, &set, None).unwrap_or_else(|e| panic!("{e}"));
-        let plan = SwarmPlan::new(&swarm).expect("laid out");
+        let plan = planned(text, &[&format!("manoeuvres=[{{ name = \"m\", legs = [{legs}] }}]")]);
         plan.cautions.iter().any(|one| one.contains("affine_error"))
     };
     // A way that is over before they are that far behind, alone and before a slow one.
