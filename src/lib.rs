@@ -89,6 +89,7 @@ pub mod shm;
 pub mod swarm;
 
 pub use continuum::builder::Builder;
+pub use continuum::equilibrium::run_to_equilibrium;
 pub use continuum::plan::Plan;
 pub use continuum::run::{Outcome, run};
 pub use engine::Engine;

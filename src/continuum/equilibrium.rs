@@ -25,8 +25,9 @@ use crate::solve::linear::{HeldComponent, NotLinear, overshoot, system};
 use crate::solve::refined::solve_refined;
 use crate::solve::shared::SystemPart;
 
-/// Runs a plan to its end as its scene asks: stepping, or straight to the equilibrium under the whole load. `see` sees each step of
-/// a stepped run as [`run`](super::run::run) shows it, and of a solved one the end.
+/// Runs a plan to its end as its scene asks: stepping, or straight to the equilibrium under the whole load or, where the scene has
+/// `[load_steps]`, under one part of it after the other, which are its steps then. `see` sees each step of a stepped run as
+/// [`run`](super::run::run) shows it, and of a solved one each equilibrium.
 ///
 /// # Errors
 /// As [`solve_equilibrium`]; a scene that is stepped has none.
@@ -35,11 +36,10 @@ pub fn run_to_equilibrium(
     plan: Plan,
     see: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>,
 ) -> Result<Outcome, SceneError> {
-    come_to_whole_load(scene, plan, None, &mut EachStep(see))
+    run_to_equilibrium_watched(scene, plan, &mut EachStep(see))
 }
 
-/// The same, seen at those steps alone that the observer names. Where the scene's `[load_steps]` asks for equilibria on the
-/// way, the steps are these.
+/// The same, seen at those steps alone that the observer names.
 ///
 /// # Errors
 /// As [`run_to_equilibrium`].

@@ -451,23 +451,9 @@ fn hold_components(weights: &mut MatrixWeights, held: &[HeldComponent]) {
 /// undiminished it does not settle, 0.95 settles after growing tenfold, 0.75 at once.
 const OF_TURNED_CELLS: f64 = 0.75;
 
-/// The update of a body, which is not asked for where a solver finds it at rest.
-pub(super) fn update(
-    scene: &Scene,
-    body: (&Body, &[RoleChange]),
-    neighbours: &Neighbours,
-    weights: &Weights,
-    team: Option<&Team>,
-) -> Update {
-    if scene.equilibrium.is_some() {
-        return scene.update;
-    }
-    update_of_steps(scene, body, neighbours, weights, team)
-}
-
 /// The update as written; unless its damping is, a material's is what the edges of the body allow, and less where cells turn, and that of
 /// weights that are solved for what those with negative ones allow. Of a part all ranks find it together.
-pub(crate) fn update_of_steps(
+pub(super) fn update(
     scene: &Scene,
     (body, changes): (&Body, &[RoleChange]),
     neighbours: &Neighbours,

@@ -110,8 +110,9 @@ pub struct Outcome {
     pub solved: Option<Solved>,
 }
 
-/// Runs a plan to its end. `see` sees the engine before the first step (with an infinite residual)
-/// and after each one, with the residual; it can break the run off.
+/// Steps a plan to its end, also that of a scene which asks for `[equilibrium]`: straight to that goes
+/// [`run_to_equilibrium`](super::equilibrium::run_to_equilibrium), which any scene can be run by. `see` sees the engine before the
+/// first step (with an infinite residual) and after each one, with the residual; it can break the run off.
 pub fn run(plan: Plan, see: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>) -> Outcome {
     run_watched(plan, &mut EachStep(see))
 }

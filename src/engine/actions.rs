@@ -175,9 +175,25 @@ impl Engine {
     }
 
     /// Adds a role that particles take at a step to come, and returns its number among the changes.
+    ///
+    /// # Panics
+    /// If that step has been taken, a particle is none, or the change is of a single component, which is held from the start.
     pub fn add_role_change(&mut self, change: RoleChange) -> usize {
+        assert!(change.from > self.step || change.when.is_some(), "step {} has been taken", change.from);
+        assert!(change.axis.is_none(), "a single component is held from the start");
+        let (number, all) = (self.changes.len(), (0..change.particles.len()).collect::<Vec<_>>());
+        let (is_at_once, has_condition) = (change.is_at_once(), change.when.is_some());
+        let count = self.roles.len();
+        assert!(change.particles.iter().all(|&particle| particle < count), "a particle of {count}");
         self.changes.push(change);
-        self.changes.len() - 1
+        if has_condition && self.taken_by.is_empty() {
+            self.taken_by = self.taken_until_now();
+        }
+        if is_at_once {
+            self.take_role(number, &all, 0);
+            self.after_role_change();
+        }
+        number
     }
 
     /// Gives the leaders of a change another motion, which says the same of the steps so far.

@@ -50,14 +50,7 @@ impl Engine {
             if let Some(before) = before.take() {
                 before.note_roles(self);
             }
-            for &which in &taking {
-                let particle = self.changes[change].particles[which];
-                self.roles[particle] = self.changes[change].role;
-                if let Some(last) = self.taken_by.get_mut(particle) {
-                    *last = (*last).max(change as u32 + 1);
-                }
-            }
-            self.start_leading(change, &taking, self.step - 1);
+            self.take_role(change, &taking, self.step - 1);
             let role = self.changes[change].role.name();
             tracing::debug!("step {}: {} particles become {role}", self.step, taking.len());
             changed = true;
@@ -67,14 +60,27 @@ impl Engine {
         }
     }
 
-    /// What [`Engine::taken_by`] is before the first step.
-    pub(super) fn taken_at_once(&self) -> Vec<u32> {
+    /// Gives these particles of a change its role, and puts them under its motion.
+    pub(super) fn take_role(&mut self, change: usize, taking: &[usize], since: usize) {
+        for &which in taking {
+            let particle = self.changes[change].particles[which];
+            self.roles[particle] = self.changes[change].role;
+            if let Some(last) = self.taken_by.get_mut(particle) {
+                *last = (*last).max(change as u32 + 1);
+            }
+        }
+        self.start_leading(change, taking, since);
+    }
+
+    /// What [`Engine::taken_by`] is after the steps so far by the changes that have no condition.
+    pub(super) fn taken_until_now(&self) -> Vec<u32> {
         if self.changes.iter().all(|change| change.when.is_none()) {
             return Vec::new();
         }
         let mut taken_by = vec![0; self.roles.len()];
-        let at_once = |change: &&RoleChange| change.is_at_once() && change.axis.is_none();
-        for (change, number) in self.changes.iter().zip(1..).filter(|(change, _)| at_once(change)) {
+        let has_begun = |change: &&RoleChange| change.from <= self.step.max(1) && change.when.is_none();
+        let is_taken = |change: &&RoleChange| has_begun(change) && change.axis.is_none();
+        for (change, number) in self.changes.iter().zip(1..).filter(|(change, _)| is_taken(change)) {
             change.particles.iter().for_each(|&particle| taken_by[particle] = number);
         }
         taken_by

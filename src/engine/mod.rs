@@ -181,7 +181,7 @@ impl Engine {
                 }
             }
         }
-        engine.taken_by = engine.taken_at_once();
+        engine.taken_by = engine.taken_until_now();
         engine.after_role_change();
         engine.begin_probes(probes);
         engine
@@ -337,6 +337,9 @@ impl Engine {
 
     /// Puts particles where they have been seen \[length\], in place of where the last step sent them; frame
     /// points follow. A body whose particles are seen where they were sent goes on as if it had not been observed.
+    ///
+    /// # Panics
+    /// If there is no such particle.
     pub fn observe(&mut self, seen: impl IntoIterator<Item = (usize, [f64; 2])>) {
         self.settled = None;
         for (particle, place) in seen {
@@ -352,8 +355,8 @@ impl Engine {
         }
     }
 
-    /// Puts a leader or a clamped particle at `place` \[length\] in the next step. There it stays, unless a program of its own leads it on; a
-    /// follower is not to be led.
+    /// Puts a leader or a clamped particle at `place` \[length\] in the next step. There it stays, unless a program of its own leads it,
+    /// also one that has come to its end; a follower is not to be led and goes its way.
     ///
     /// # Panics
     /// If there is no such particle.
@@ -362,15 +365,23 @@ impl Engine {
         self.guided.push(Guided { particle, place, is_there: false });
     }
 
-    /// Goes another part of the way to each target from the next step on \[1\].
+    /// Goes another part of the way to each target from the next step on \[1\]; no state of the engine has it.
+    ///
+    /// # Panics
+    /// If it is not in 0 to 2, beyond which no step comes nearer to its target.
     pub fn set_damping(&mut self, damping: f64) {
+        assert!((0.0..=2.0).contains(&damping), "damping {damping} is not in 0 to 2");
         self.update.damping = damping;
         self.compile_sweep();
     }
 
     /// Displaces all particles by `displacement` \[length\], shape \[count\], as if the body had come to rest
     /// there by `step`; frame points copy the particles that they serve.
+    ///
+    /// # Panics
+    /// Displacements of more or fewer particles.
     pub fn place_at_rest(&mut self, step: usize, displacement: &Vectors) {
+        assert_eq!(displacement.len(), self.body.reference.len(), "displacements, for so many particles");
         self.step = step;
         let reference = &self.body.reference;
         let place = |(here, by): ([f64; 2], [f64; 2])| [here[0] + by[0], here[1] + by[1]];

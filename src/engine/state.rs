@@ -12,7 +12,7 @@ use super::Engine;
 use super::leaders::{Guided, Led};
 use super::serde_impls;
 use super::setup::Setup;
-use crate::flock::fracture::Break;
+use crate::flock::fracture::{Bonds, Break};
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
@@ -63,7 +63,7 @@ impl<'a> EngineState<'a> {
         let leading = |led: &Led| Led { particle: body.index(led.particle), ..*led };
         let own = body.part.as_ref().map_or_else(Vec::new, |_| body.owned_in_order());
         let flock = &engine.flock;
-        let packed = |byte: usize, bonds: &crate::flock::fracture::Bonds| {
+        let packed = |byte: usize, bonds: &Bonds| {
             let all = 8 * byte..(8 * byte + 8).min(flock.neighbours.index.len());
             all.fold(0, |bits, bond| bits | u8::from(bonds.is_broken(bond)) << (bond % 8))
         };
@@ -176,6 +176,10 @@ impl<'a> EngineState<'a> {
         let mut engine = Engine::new(setup);
         engine.step = self.step;
         engine.conduct_until_now();
+        if self.broken.is_some() && engine.flock.bonds.is_none() {
+            // A cut that no plan has made them.
+            engine.flock.bonds = Some(Bonds::uncut(&engine.flock.neighbours));
+        }
         self.require_fits(&engine)?;
         engine.follow_ramp();
         engine.move_components();

@@ -209,6 +209,12 @@ impl Outline {
     }
 
     fn check(&self) -> Result<(), OutlineError> {
+        let is_finite = |piece: &Piece| piece.from.iter().all(|x| x.is_finite());
+        let is_none = |ring: &Vec<Piece>| ring.is_empty() || !ring.iter().all(is_finite);
+        let none = if self.rings.is_empty() { Some(0) } else { self.rings.iter().position(is_none) };
+        if let Some(ring) = none {
+            return Err(OutlineError::NoArea { ring, place: [f64::NAN; 2] });
+        }
         let near = NOTHING * self.size();
         let flat = (0..self.rings.len()).find(|&ring| is_flat(&self.rings[ring], near));
         // The halves of a bow tie cancel: what is wrong with it is the crossing.
@@ -309,6 +315,16 @@ mod tests {
                 ],
             },
         ]
+    }
+
+    #[test]
+    fn polygons_that_are_none_have_no_outline() {
+        let nan = vec![[0.0, 0.0], [1.0, f64::NAN], [1.0, 1.0]];
+        let none = [vec![], vec![Vec::new()], vec![nan.clone()], vec![square(0.0, 9.0), nan]];
+        for polygons in none {
+            let refused = Outline::of_polygons(&polygons);
+            assert!(matches!(refused, Err(OutlineError::NoArea { .. })), "{polygons:?}: {refused:?}");
+        }
     }
 
     #[test]

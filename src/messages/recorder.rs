@@ -112,8 +112,8 @@ pub fn parameters(control: &Control) -> [(&'static str, f64); 6] {
 pub fn set_parameter(control: &mut Control, name: &str, value: f64) -> Result<bool, SafetyError> {
     let mut limits = control.limits().clone();
     match name {
-        "period" if value > 0.0 => control.set_period(value),
-        "damping" => control.set_damping(value),
+        "period" => return Ok(control.set_period(value)),
+        "damping" => return Ok(control.set_damping(value)),
         "sweeps" if value >= 1.0 => control.set_sweeps(value as usize),
         "speed_limit" => limits.speed = value,
         "acceleration_limit" => limits.acceleration = value,

@@ -15,7 +15,6 @@ use super::source::Source;
 use super::threads::{Threads, here};
 use crate::continuum::equilibrium::{run_to_equilibrium_watched, solve_equilibrium};
 use crate::continuum::mechanics::{Mechanics, Stresses};
-use crate::continuum::plan::update_of_steps;
 use crate::continuum::run::{Divergence, Outcome, StopReason, overflow};
 use crate::engine::Engine;
 use crate::engine::forces::Forces;
@@ -39,25 +38,12 @@ pub(super) struct Body {
     engine: Engine,
     /// Of the solve that put the body to rest, if it has not moved since.
     residual: Option<f64>,
-    /// Whether the update is one for a body that a solver puts to rest.
-    is_to_be_stepped: bool,
 }
 
 impl Body {
     /// The body of a scene as an engine has it.
     pub(super) fn at(scene: Scene, engine: Engine, residual: Option<f64>) -> Self {
-        let is_to_be_stepped = scene.equilibrium.is_some();
-        Self { scene, engine, residual, is_to_be_stepped }
-    }
-
-    /// Takes the update of a body that is stepped.
-    fn suit_steps(&mut self) {
-        if std::mem::take(&mut self.is_to_be_stepped) {
-            let (engine, flock) = (&self.engine, self.engine.flock());
-            let body = (engine.body(), engine.changes());
-            let update = update_of_steps(&self.scene, body, &flock.neighbours, &flock.weights, None);
-            self.engine.set_damping(update.damping);
-        }
+        Self { scene, engine, residual }
     }
 
     pub(super) fn count(&self) -> usize {
@@ -172,10 +158,7 @@ impl Body {
         let threads = Threads::taken()?;
         self.residual = None;
         while self.engine.step() < end {
-            let mut go = || {
-                self.suit_steps();
-                self.go(end)
-            };
+            let mut go = || self.go(end);
             if let Some(divergence) = py.detach(|| threads.install(&mut go)) {
                 return Err(diverged(&divergence));
             }
@@ -237,12 +220,7 @@ impl Body {
 
     /// A body in the same state that goes its own way.
     fn copy(&self) -> Self {
-        Self {
-            scene: self.scene.clone(),
-            engine: self.engine.clone(),
-            residual: self.residual,
-            is_to_be_stepped: self.is_to_be_stepped,
-        }
+        Self { scene: self.scene.clone(), engine: self.engine.clone(), residual: self.residual }
     }
 
     /// Present places [length], float64, shape (count, 2); a copy.

@@ -410,6 +410,26 @@ fn members_without_a_pose_or_a_target_are_held_and_avoided_where_they_were_seen(
 }
 
 #[test]
+fn an_age_that_is_no_number_is_any_age() {
+    let ways = [[[0.0, 0.0], [0.4, 0.0]], [[0.4, 0.0], [0.0, 0.0]]];
+    let moved = |age: f64| {
+        let mut world = World::new(limits(1.0, 0.1), 0.1, &[], &ways);
+        let seen = Seen {
+            present: &world.present,
+            known: &[true; 2],
+            ages: &[age; 2],
+            velocity: None,
+            strays: None,
+        };
+        world.filter.apply(&seen, &world.goals, 0.1, &mut world.safe, &mut world.flags);
+        distance(world.present.get(0), world.safe.get(0))
+    };
+    assert!(moved(0.0) > 0.01);
+    assert_eq!(moved(f64::INFINITY), 0.0);
+    assert_eq!(moved(f64::NAN), 0.0);
+}
+
+#[test]
 fn a_node_that_knows_one_member_and_its_surroundings_gives_the_bits_of_one_that_knows_all() {
     let mut random = Pcg64Mcg::seed_from_u64(30);
     let ways: Vec<_> = (0..200)

@@ -229,11 +229,15 @@ impl Control {
         self.programs.time(self.period)
     }
 
-    /// Changes the time between two ticks \[s\] from the next one on.
-    pub fn set_period(&mut self, period: f64) {
+    /// Changes the time between two ticks \[s\] from the next one on; false, and nothing changes, where it is not finite and above 0.
+    pub fn set_period(&mut self, period: f64) -> bool {
+        if !(period.is_finite() && period > 0.0) {
+            return false;
+        }
         self.programs.before_another(self.period);
         self.filter.stretch_period(period / self.period);
         self.period = period;
+        true
     }
 
     /// The part of the way to its target that a follower goes in a sweep \[1\].
@@ -304,7 +308,9 @@ impl Control {
     /// place lies where no pose would be believed.
     pub fn place_leader(&mut self, member: usize, place: [f64; 2]) -> bool {
         let now = self.program_time();
-        self.is_believed(place) && self.formation.place_leader(member, place, now)
+        self.is_believed(place)
+            && member < self.formation.names.len()
+            && self.formation.place_leader(member, place, now)
     }
 
     /// As [`Control::place_leader`], for any leader, whose own program ends with this.
@@ -423,9 +429,14 @@ impl Control {
         Ok(())
     }
 
-    /// Sets the part of the way to its target that a follower goes in a sweep \[1\].
-    pub fn set_damping(&mut self, damping: f64) {
-        self.formation.set_damping(damping);
+    /// Sets the part of the way to its target that a follower goes in a sweep \[1\]; false, and nothing changes, where it is not in
+    /// 0 to 2.
+    pub fn set_damping(&mut self, damping: f64) -> bool {
+        let is_one = (0.0..=2.0).contains(&damping);
+        if is_one {
+            self.formation.set_damping(damping);
+        }
+        is_one
     }
 
     /// Applications of the rule in a period \[1\].

@@ -118,6 +118,21 @@ pub fn published_flags(bits: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::swarm::examples::bundled;
+
+    #[test]
+    fn a_period_or_a_damping_that_is_none_changes_nothing() {
+        let mut control = Control::new(&bundled("square", &[])).expect("laid out");
+        let before = (control.period(), control.damping());
+        for none in [f64::NAN, f64::INFINITY, -0.1] {
+            assert!(!control.set_period(none) && !control.set_damping(none), "{none}");
+        }
+        assert!(!control.set_period(0.0) && !control.set_damping(2.1));
+        assert_eq!((control.period(), control.damping()), before);
+        assert!(!control.place_leader(99, [0.0; 2]), "no such member");
+        assert!(control.set_period(0.2) && control.set_damping(0.5));
+        assert_eq!((control.period(), control.damping()), (0.2, 0.5));
+    }
 
     #[test]
     fn the_flags_of_the_filter_and_of_the_loop_are_published_in_one_order() {

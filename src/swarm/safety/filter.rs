@@ -51,9 +51,9 @@ pub struct Seen<'a> {
     pub present: &'a Vectors,
     /// Whether a member gets a target. The others are avoided where they were last seen.
     pub known: &'a [bool],
-    /// Ages of the poses \[s\].
+    /// Ages of the poses \[s\]; one that is not a number is any age.
     pub ages: &'a [f64],
-    /// Present velocities \[m/s\]; without them no acceleration is limited. Of members that brake
+    /// Present velocities \[m/s\]; without them, and of a member whose velocity is not finite, no acceleration is limited. Of members that brake
     /// ([`Limits::brakes`]) places and velocities are to be estimates of the present ones.
     pub velocity: Option<&'a Vectors>,
     /// What members may do otherwise; without it nothing is known of that.
@@ -234,7 +234,7 @@ impl Filter {
     /// `|safe - present| / period` unless they brake ([`Limits::brakes`]).
     ///
     /// # Panics
-    /// If the slices are not as long as there are members.
+    /// If the slices are not as long as there are members, or the period is not finite and above 0.
     pub fn apply(
         &mut self,
         seen: &Seen,
@@ -246,6 +246,7 @@ impl Filter {
         let count = self.radii.len();
         let lengths = [seen.present.len(), seen.known.len(), seen.ages.len(), wanted.len(), flags.len()];
         assert_eq!(lengths, [count; 5], "one of everything for each member");
+        assert!(period.is_finite() && period > 0.0, "a period of {period} s");
         self.meet(seen, wanted, period);
         safe.clone_from(seen.present);
         for (member, flags) in flags.iter_mut().enumerate() {
@@ -354,7 +355,11 @@ impl Filter {
     /// Largest distance of a member from its pose \[m\] by its age.
     pub(super) fn drift(&self, seen: &Seen, member: usize) -> f64 {
         let (age, fastest) = (seen.ages[member], self.fastest());
-        if fastest.is_finite() && age > 0.0 { fastest * age } else { 0.0 }
+        match fastest.is_finite() {
+            true if age.is_nan() => f64::INFINITY,
+            true => fastest * age.max(0.0),
+            false => 0.0,
+        }
     }
 
     /// Whether a member of this radius \[m\] may stand at a place.
