@@ -232,33 +232,20 @@ mod tests {
         use crate::flock::condition::{Condition, Quantity};
         use crate::flock::motion::{Interpolation, Keyframe, Motion};
         let sheet = Builder::new(LatticeKind::Square { spacing: 1.0 }).grid(6, 4).clamp(Side::Left);
-        let change = RoleChange {
-            particles: vec![23],
-            role: Role::Clamped,
-            axis: None,
-            from: 1,
-            when: None,
-            motion: None,
-        };
         for before in [0, 3] {
             let mut engine = sheet.clone().clamp(Side::Right).engine().expect("laid out");
             engine.lead(23, [9.0, 9.0]);
             (0..before).for_each(|_| engine.advance());
-            engine.add_role_change(RoleChange {
-                role: Role::Follower,
-                from: engine.step() + 1,
-                ..change.clone()
-            });
+            engine.add_role_change(RoleChange::new(vec![23], Role::Follower, before + 1));
             (0..30).for_each(|_| engine.advance());
             assert!(engine.present().get(23)[0] < 6.0, "it follows: {:?}", engine.present().get(23));
         }
         let mut engine = sheet.engine().expect("laid out");
         let frames = vec![Keyframe { step: 5.0, displacement: [1.0, 0.0] }];
         engine.add_role_change(RoleChange {
-            role: Role::Leader,
             when: Some(Condition { quantity: Quantity::X, above: Some(-100.0), below: None }),
             motion: Some(Motion::Keyframes { frames, interpolation: Interpolation::Linear }),
-            ..change
+            ..RoleChange::new(vec![23], Role::Leader, 1)
         });
         (0..40).for_each(|_| engine.advance());
         assert!((engine.displacement(23)[0] - 1.0).abs() < 1e-12, "{:?}", engine.displacement(23));

@@ -68,6 +68,11 @@ pub struct RoleChange {
 }
 
 impl RoleChange {
+    /// The whole of particles that stay where they are then, or follow, from a step on.
+    pub fn new(particles: Vec<usize>, role: Role, from: usize) -> Self {
+        Self { particles, role, axis: None, from, when: None, motion: None }
+    }
+
     /// Whether the particles have the role before the first step.
     pub(crate) fn is_at_once(&self) -> bool {
         self.from <= 1 && self.when.is_none()

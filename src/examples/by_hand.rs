@@ -1,5 +1,5 @@
-//! A body stepped in real time, as in a game: one side is moved by hand, the rest follows, and the program never waits for it to
-//! come to rest.
+//! A body stepped in real time, as in a game: one side is moved by hand and let go half-way, the rest follows, and the program never
+//! waits for it to come to rest.
 //!
 //! ```sh
 //! cargo run --release --example by_hand
@@ -7,6 +7,8 @@
 
 use std::time::{Duration, Instant};
 
+use flockform::engine::setup::RoleChange;
+use flockform::flock::role::Role;
 use flockform::{Builder, LatticeKind, SceneError, Side};
 
 /// Frames a second, and steps of the body in each: the more, the stiffer it looks.
@@ -31,9 +33,13 @@ fn main() -> Result<(), SceneError> {
         // Where a hand, or anything else, has the held side now.
         let time = f64::from(number) / f64::from(FRAMES);
         let by = [0.5 * time.sin(), (2.0 * time).sin()];
-        for &particle in &held {
-            let [x, y] = reference.get(particle);
-            engine.lead(particle, [x + by[0], y + by[1]]);
+        if number < SECONDS * FRAMES / 2 {
+            for &particle in &held {
+                let [x, y] = reference.get(particle);
+                engine.lead(particle, [x + by[0], y + by[1]]);
+            }
+        } else if number == SECONDS * FRAMES / 2 {
+            engine.add_role_change(RoleChange::new(held.clone(), Role::Follower, engine.step() + 1));
         }
         (0..STEPS_A_FRAME).for_each(|_| engine.advance());
         // Here a program draws `engine.present()`.

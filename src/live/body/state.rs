@@ -170,7 +170,7 @@ impl State {
         let frames = vec![Keyframe { step: 1.0, displacement: [0.0; 2] }];
         self.hands.push(raw_role(RawRegion::Ids { ids }, RawRole::Leader, from));
         let motion = Some(motion(frames.clone()));
-        let change = RoleChange { motion, ..role_change(particles.to_vec(), Role::Leader, from) };
+        let change = RoleChange { motion, ..RoleChange::new(particles.to_vec(), Role::Leader, from) };
         let change = self.engine.add_role_change(change);
         Lead { change, hand: self.hands.len() - 1, frames, since: from - 1, from: taken_at }
     }
@@ -198,7 +198,7 @@ impl State {
         let region = self.hands[lead.hand].region.clone();
         self.hands.push(raw_role(region, RawRole::Follower, from));
         let particles = self.engine.changes()[lead.change].particles.clone();
-        self.engine.add_role_change(role_change(particles, Role::Follower, from));
+        self.engine.add_role_change(RoleChange::new(particles, Role::Follower, from));
     }
 
     /// Particles that hands have taken on since the last step, and how far they are to go \[length\].
@@ -337,11 +337,6 @@ impl Lead {
 /// A role that is taken at a step, without motion.
 fn raw_role(region: RawRegion, role: RawRole, from: usize) -> RawRoles {
     RawRoles { region, role, axis: None, from, when: None, motion: None }
-}
-
-/// The same in the engine.
-fn role_change(particles: Vec<usize>, role: Role, from: usize) -> RoleChange {
-    RoleChange { particles, role, axis: None, from, when: None, motion: None }
 }
 
 /// Jumps, so that each place is one that the hand was at.
