@@ -57,7 +57,8 @@ impl Builder {
         Self { keys: vec![lattice, ends.into()], roles: Vec::new() }
     }
 
-    /// Any key of the scene format, as on the command line: `rule.mean.kind=distance`, `frame=lagged`, `stop.steps=500`.
+    /// Any key of the scene format, as on the command line: `rule.mean.kind=distance`, `frame=lagged`, `stop.steps=500`. A later one takes
+    /// the place of what has been said of it before, by [`Builder::material`] or a shape too; `roles` that of all that is clamped and led.
     pub fn set(mut self, key_and_value: impl Into<String>) -> Self {
         self.keys.push(key_and_value.into());
         self

@@ -54,7 +54,7 @@ impl StopReason {
         }
     }
 
-    /// Whether the run ended as its scene asks.
+    /// Whether the run came to rest, or made all of its steps.
     pub fn is_good(&self) -> bool {
         matches!(self, StopReason::Equilibrium | StopReason::Steps)
     }

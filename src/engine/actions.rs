@@ -174,7 +174,7 @@ impl Engine {
         })
     }
 
-    /// Adds a role that particles take at a step to come, and returns its number among the changes.
+    /// Adds a role that particles take at a step to come, and returns its number among the changes, which no state of the engine has.
     ///
     /// # Panics
     /// If that step has been taken, a particle is none, or the change is of a single component, which is held from the start.

@@ -129,9 +129,13 @@ impl Engine {
         usize::from(self.probes.is_some() && self.sweep.domain().is_some())
     }
 
-    /// Takes so many steps, as many as [`Engine::steps_at_once`] allows; the bits are those of single ones.
+    /// Takes so many steps, as many as [`Engine::steps_at_once`] allows; the bits are those of single ones. More than that would leave
+    /// out what is due in between.
     /// Returns for each whether a particle is known to have moved farther in it than `farther` \[length\].
     pub fn advance_by(&mut self, count: usize, farther: Option<f64>) -> Vec<bool> {
+        if count == 0 {
+            return Vec::new();
+        }
         let spare = self.spare_bands();
         let mut moved = Vec::with_capacity(count);
         // Probes see each step, and the bands that those to come need are moved along.

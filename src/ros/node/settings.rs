@@ -62,7 +62,7 @@ pub(super) fn declare(
         at_most("speed_limit", limits.speed).describe("highest speed of a robot [m/s]"),
         at_most("acceleration_limit", limits.acceleration)
             .checked("of robots that brake by themselves as in the swarm file", {
-                let braking = (limits.brakes && limits.acceleration.is_finite()).then_some(limits.acceleration);
+                let braking = limits.braking();
                 move |_, value| match braking.is_none_or(|own| value.as_double() == Some(own)) {
                     true => Ok(()),
                     false => Err("robots of the model \"double-integrator\" brake as limits.acceleration says, whatever is \

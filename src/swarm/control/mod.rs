@@ -14,7 +14,7 @@ use programs::{Heard, Programs};
 
 use super::formation::{Formation, LeadSnapshot, Measures, Seen};
 use super::robots::{DoubleIntegrator, Robot};
-use super::safety::{self, Filter, Flags, Limits, SafetyError, Stray};
+use super::safety::{self, Filter, Flags, Limits, Place, SafetyError, Stray};
 use super::transport::Received;
 use super::watch::{Gains, Health, Pose, Range, Rejection, Track, Watch};
 use crate::flock::manoeuvre::Manoeuvre;
@@ -138,7 +138,7 @@ impl Control {
         let max_faulty = setup::max_faulty(swarm, &formation)?;
         let filter = setup::filter(swarm, &formation)?;
         let watch = setup::watch(swarm, &formation, filter.limits().speed);
-        let brakes = filter.limits().brakes && filter.limits().acceleration.is_finite();
+        let brakes = filter.limits().braking().is_some();
         // A robot that gets no target stands.
         let starts = formation.starts(swarm)?.iter().map(|place| Start { place, age: 0.0 }).collect();
         Ok(Self {
@@ -411,8 +411,13 @@ impl Control {
     }
 
     /// # Errors
-    /// Names a limit that is none; the old ones then stay.
+    /// Names a limit that is none, or by which members would begin, cease or otherwise than so far brake by themselves; the old ones
+    /// then stay.
     pub fn set_limits(&mut self, limits: Limits) -> Result<(), SafetyError> {
+        if limits.braking() != self.filter.limits().braking() {
+            let fault = " is what members brake by, or do not, from the start: give it in the swarm file, with their model";
+            return Err(Place::Limit("acceleration").refused(fault));
+        }
         self.filter.set_limits(limits)
     }
 

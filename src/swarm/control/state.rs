@@ -119,6 +119,7 @@ pub fn published_flags(bits: u32) -> u32 {
 mod tests {
     use super::*;
     use crate::swarm::examples::bundled;
+    use crate::swarm::safety::Limits;
 
     #[test]
     fn a_period_or_a_damping_that_is_none_changes_nothing() {
@@ -132,6 +133,23 @@ mod tests {
         assert!(!control.place_leader(99, [0.0; 2]), "no such member");
         assert!(control.set_period(0.2) && control.set_damping(0.5));
         assert_eq!((control.period(), control.damping()), (0.2, 0.5));
+    }
+
+    #[test]
+    fn members_do_not_begin_to_brake_on_the_way() {
+        let mut control = Control::new(&bundled("square", &[])).expect("laid out");
+        let limits = Limits { brakes: true, acceleration: 0.5, ..control.limits().clone() };
+        assert!(control.set_limits(limits.clone()).is_err());
+        let slower = Limits { acceleration: 0.5, ..control.limits().clone() };
+        assert!(control.set_limits(slower).is_ok(), "without braking by themselves");
+        let file = ["flight.model={ kind = \"double-integrator\" }", "limits.acceleration=0.5"];
+        let mut control = Control::new(&bundled("square", &file)).expect("laid out");
+        for acceleration in [f64::INFINITY, 0.4] {
+            let limits = Limits { acceleration, ..control.limits().clone() };
+            assert!(control.set_limits(limits).is_err(), "{acceleration}");
+        }
+        let limits = Limits { speed: 0.1, ..control.limits().clone() };
+        assert!(control.set_limits(limits).is_ok());
     }
 
     #[test]

@@ -20,7 +20,7 @@ impl Filter {
 
     /// Whether targets are made for members that brake.
     pub(super) fn brakes(&self, seen: &Seen) -> bool {
-        self.limits.brakes && self.limits.acceleration.is_finite() && seen.velocity.is_some()
+        self.limits.braking().is_some() && seen.velocity.is_some()
     }
 
     /// The place at which a member comes to rest if it brakes now \[m, world frame\].

@@ -77,12 +77,17 @@ pub enum Place {
 
 impl Place {
     /// Refuses it, for a fault that is worded as it follows its name.
-    pub(super) fn refused(self, fault: impl Into<String>) -> SafetyError {
+    pub(in crate::swarm) fn refused(self, fault: impl Into<String>) -> SafetyError {
         SafetyError { place: self, fault: fault.into() }
     }
 }
 
 impl Limits {
+    /// The acceleration that members brake by themselves with \[m/s^2\], where they do.
+    pub(crate) fn braking(&self) -> Option<f64> {
+        Some(self.acceleration).filter(|acceleration| self.brakes && acceleration.is_finite())
+    }
+
     /// Refuses limits that are negative or not numbers.
     pub(super) fn check(&self) -> Result<(), SafetyError> {
         let refused = |name, value: f64, range: &str| {
