@@ -181,16 +181,15 @@ impl Engine {
     pub fn add_role_change(&mut self, change: RoleChange) -> usize {
         assert!(change.from > self.step || change.when.is_some(), "step {} has been taken", change.from);
         assert!(change.axis.is_none(), "a single component is held from the start");
-        let (number, all) = (self.changes.len(), (0..change.particles.len()).collect::<Vec<_>>());
-        let (is_at_once, has_condition) = (change.is_at_once(), change.when.is_some());
         let count = self.roles.len();
         assert!(change.particles.iter().all(|&particle| particle < count), "a particle of {count}");
+        let (number, size, is_at_once) = (self.changes.len(), change.particles.len(), change.is_at_once());
         self.changes.push(change);
-        if has_condition && self.taken_by.is_empty() {
+        if self.taken_by.is_empty() {
             self.taken_by = self.taken_until_now();
         }
         if is_at_once {
-            self.take_role(number, &all, 0);
+            self.take_role(number, &Vec::from_iter(0..size), 0);
             self.after_role_change();
         }
         number

@@ -68,7 +68,7 @@ pub struct RoleChange {
 }
 
 impl RoleChange {
-    /// The whole of particles that stay where they are then, or follow, from a step on.
+    /// A role that these particles take from a step on, with both components and without a motion.
     pub fn new(particles: Vec<usize>, role: Role, from: usize) -> Self {
         Self { particles, role, axis: None, from, when: None, motion: None }
     }

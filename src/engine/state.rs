@@ -176,9 +176,10 @@ impl<'a> EngineState<'a> {
         let mut engine = Engine::new(setup);
         engine.step = self.step;
         engine.conduct_until_now();
-        if self.broken.is_some() && engine.flock.bonds.is_none() {
-            // A cut that no plan has made them.
-            engine.flock.bonds = Some(Bonds::uncut(&engine.flock.neighbours));
+        if self.broken.is_some() {
+            // Where the plan has none, a cut by hand made them.
+            let flock = &mut engine.flock;
+            flock.bonds.get_or_insert_with(|| Bonds::uncut(&flock.neighbours));
         }
         self.require_fits(&engine)?;
         engine.follow_ramp();

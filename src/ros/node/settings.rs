@@ -192,7 +192,7 @@ impl Settings {
             "rate" => {
                 self.rate = number;
                 pace.set_rate(number);
-                _ = control.set_period(1.0 / number);
+                control.set_period(1.0 / number);
             }
             "state_rate" => self.state_rate = number,
             name => {

@@ -96,8 +96,6 @@ pub struct Control {
     filter: Filter,
     /// Where members are by the targets sent to them.
     tracks: Vec<Track>,
-    /// Whether they take time to brake.
-    brakes: bool,
     /// Members whose targets this loop sends.
     serves: Vec<bool>,
     /// Liars tolerated among a member's neighbours.
@@ -138,13 +136,11 @@ impl Control {
         let max_faulty = setup::max_faulty(swarm, &formation)?;
         let filter = setup::filter(swarm, &formation)?;
         let watch = setup::watch(swarm, &formation, filter.limits().speed);
-        let brakes = filter.limits().braking().is_some();
         // A robot that gets no target stands.
         let starts = formation.starts(swarm)?.iter().map(|place| Start { place, age: 0.0 }).collect();
         Ok(Self {
             watch: Watch::new(count, watch),
             tracks: vec![Track::default(); count],
-            brakes,
             serves: vec![true; count],
             filter,
             max_faulty,
@@ -262,7 +258,9 @@ impl Control {
         }
         let (dynamics, deviation) = (self.dynamics(), self.filter.limits().deviation);
         match (&verdict, &mut self.tracks[member]) {
-            (Ok(()), track) if self.brakes => track.correct(&pose, &dynamics, self.period, deviation),
+            (Ok(()), track) if self.filter.limits().braking().is_some() => {
+                track.correct(&pose, &dynamics, self.period, deviation)
+            }
             (Ok(()), track) => track.note(&pose, self.period),
             (Err(_), _) => {}
         }
@@ -295,7 +293,7 @@ impl Control {
     /// The velocity \[m/s\] with which a member that takes time to brake ends the next period on its way to a target \[m\];
     /// `None` of others.
     pub fn next_velocity(&self, member: usize, target: [f64; 2]) -> Option<[f64; 2]> {
-        self.brakes.then(|| {
+        self.filter.limits().braking().is_some().then(|| {
             let [position, velocity] =
                 [&self.tracked.present, &self.tracked.velocity].map(|of| of.get(member));
             let mut robot = Robot { position, velocity, yaw: 0.0 };
@@ -308,9 +306,7 @@ impl Control {
     /// place lies where no pose would be believed.
     pub fn place_leader(&mut self, member: usize, place: [f64; 2]) -> bool {
         let now = self.program_time();
-        self.is_believed(place)
-            && member < self.formation.names.len()
-            && self.formation.place_leader(member, place, now)
+        self.is_believed(place) && self.formation.place_leader(member, place, now)
     }
 
     /// As [`Control::place_leader`], for any leader, whose own program ends with this.
@@ -466,7 +462,7 @@ impl Control {
         let active = self.is_active;
         let Self { present, velocity, ages, usable: known, tracked, .. } = self;
         let places = &*present;
-        let (present, velocity, ages) = match self.brakes {
+        let (present, velocity, ages) = match self.filter.limits().braking().is_some() {
             true => (&tracked.present, &tracked.velocity, &tracked.ages),
             false => (&*present, &*velocity, &*ages),
         };
@@ -488,7 +484,7 @@ impl Control {
         for member in 0..self.tracks.len() {
             let target = self.target(member);
             // Others may move it while the loop sends it nothing.
-            match active || self.brakes {
+            match active || self.filter.limits().braking().is_some() {
                 true => self.tracks[member].send(now, target),
                 false => self.tracks[member].forget(),
             }
@@ -537,7 +533,7 @@ impl Control {
         for (member, track) in self.tracks.iter().enumerate() {
             let stray = &mut strays[member];
             let follows = self.serves[member] && track.is_of(self.present.get(member));
-            if !self.brakes {
+            if self.filter.limits().braking().is_none() {
                 stray.places.clear();
                 // One that was found to lie was elsewhere when it was sent there.
                 let is_doubted = self.watch.is_doubted(member);

@@ -37,6 +37,9 @@ impl Formation {
     /// Gives a leader that is moved from outside a new place \[m\] at `now` \[s\]; false for any other member, and during a
     /// manoeuvre.
     pub fn place_leader(&mut self, member: usize, place: [f64; 2], now: f64) -> bool {
+        if member >= self.leads.len() {
+            return false;
+        }
         if let Some(Lead::External(moved)) = &mut self.leads[member] {
             *moved = place;
             return true;

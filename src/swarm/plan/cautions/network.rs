@@ -115,7 +115,7 @@ pub fn of_simulated_robots(raw: &RawSwarm) -> Option<&'static str> {
 
 /// The velocity of a robot that takes time to brake follows from its poses.
 fn exact_poses(limits: &Limits) -> Option<&'static str> {
-    (limits.brakes && limits.acceleration.is_finite() && limits.deviation == 0.0).then_some(
+    (limits.braking().is_some() && limits.deviation == 0.0).then_some(
         "flight.noise = 0 says that poses are exact, and those of real robots are not: where the model \"double-integrator\" \
          flies them, give flight.noise the standard deviation of their poses",
     )
