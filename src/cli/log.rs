@@ -16,11 +16,14 @@ use flockform::ros::edge::rosout::MOST_WAITING;
 use flockform::ros::{node, robots};
 use tracing::field::Field;
 use tracing::{Event, Level, Metadata, Subscriber};
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::Targets;
 use tracing_subscriber::fmt::format::{self, Writer};
 use tracing_subscriber::fmt::writer::BoxMakeWriter;
 use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields};
+use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::registry::LookupSpan;
+use tracing_subscriber::reload;
+use tracing_subscriber::util::SubscriberInitExt;
 
 use super::log_writer::LogWriter;
 use super::node::Transport;
@@ -36,13 +39,13 @@ const MOST_CHARACTERS: usize = 2000;
 struct NodeLog {
     severity: Mutex<Severity>,
     /// Severity and filter at the start, to which level 0 returns.
-    first: (Severity, String),
-    filter: Box<dyn Fn(EnvFilter) -> Result<(), String> + Send + Sync>,
+    first: (Severity, Targets),
+    filter: Box<dyn Fn(Targets) -> Result<(), String> + Send + Sync>,
 }
 
 impl NodeLog {
     /// Severity and filter when this severity is asked for.
-    fn of(&self, wanted: Severity) -> (Severity, String) {
+    fn of(&self, wanted: Severity) -> (Severity, Targets) {
         match wanted {
             Severity::Unset => self.first.clone(),
             _ => (wanted, only_ours(filter_of(wanted, 0))),
@@ -67,7 +70,7 @@ pub fn level() -> Option<LogLevel> {
         get: Box::new(move || *severity()),
         set: Box::new(move |wanted| {
             let (wanted, filter) = log.of(wanted);
-            (log.filter)(filter.into())?;
+            (log.filter)(filter)?;
             *severity() = wanted;
             Ok(())
         }),
@@ -86,10 +89,11 @@ pub fn start(arguments: &Arguments, ros: &RosArguments) {
     let level = if is_console || is_topic {
         only_ours(filter_of(given.unwrap_or(Severity::Unset), verbosity))
     } else {
-        "off".to_owned()
+        Targets::new()
     };
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| level.into());
-    let first = (given.unwrap_or(Severity::Unset), filter.to_string());
+    let asked = std::env::var("RUST_LOG").ok().and_then(|asked| asked.replace(' ', "").parse().ok());
+    let filter = asked.unwrap_or(level);
+    let first = (given.unwrap_or(Severity::Unset), filter.clone());
     // A control loop must not wait for a reader; any other command may.
     let thread = (is_console && is_node).then(|| LogWriter::start(std::io::stderr()));
     let writer = match thread {
@@ -97,27 +101,28 @@ pub fn start(arguments: &Arguments, ros: &RosArguments) {
         _ if is_console => BoxMakeWriter::new(std::io::stderr),
         _ => BoxMakeWriter::new(std::io::sink),
     };
-    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(writer);
-    let log = log.with_ansi(std::io::stderr().is_terminal()).fmt_fields(format::debug_fn(field));
+    let (filter, handle) = reload::Layer::new(filter);
+    let log = tracing_subscriber::registry().with(filter);
+    let lines = tracing_subscriber::fmt::layer().with_writer(writer);
+    let lines = lines.with_ansi(std::io::stderr().is_terminal()).fmt_fields(format::debug_fn(field));
     match logger {
-        None => log.without_time().init(),
+        None => log.with(lines.without_time()).init(),
         Some(name) => {
             let asked = std::env::var("RCUTILS_CONSOLE_OUTPUT_FORMAT").ok();
             let format = asked.filter(|format| !format.is_empty()).unwrap_or_else(|| NODE_FORMAT.into());
-            let lines = is_topic.then(|| {
+            let topic = is_topic.then(|| {
                 let (sender, lines) = sync_channel(MOST_WAITING);
                 *LINES.lock().unwrap_or_else(PoisonError::into_inner) = Some(lines);
                 sender
             });
-            let log = log.event_format(NodeLines { name, format, lines }).with_filter_reloading();
-            let handle = log.reload_handle();
+            let lines = lines.event_format(NodeLines { name, format, topic });
             let severity = Mutex::new(first.0);
             let filter = Box::new(move |filter| handle.reload(filter).map_err(|error| error.to_string()));
             if is_console || is_topic {
                 // Set once: a process starts one log.
                 let _ = NODE_LOG.set(NodeLog { severity, first, filter });
             }
-            log.init();
+            log.with(lines).init();
         }
     }
 }
@@ -136,8 +141,8 @@ fn filter_of(severity: Severity, verbosity: u8) -> &'static str {
 }
 
 /// Without the warnings of the middleware, which reports every peer that comes and goes.
-fn only_ours(level: &str) -> String {
-    format!("{level},rustdds=error,ros2_client=error")
+fn only_ours(level: &str) -> Targets {
+    format!("{level},rustdds=error,ros2_client=error").parse().expect("targets and their levels")
 }
 
 /// Name of the logger of the node that a command is, with dots as `rcl` has them; none of other commands.
@@ -165,7 +170,7 @@ struct NodeLines {
     /// With the placeholders of `RCUTILS_CONSOLE_OUTPUT_FORMAT`.
     format: String,
     /// To `/rosout`, if they go there.
-    lines: Option<SyncSender<Log>>,
+    topic: Option<SyncSender<Log>>,
 }
 
 impl<S, N> FormatEvent<S, N> for NodeLines
@@ -184,9 +189,9 @@ where
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let line =
             filled(&self.format, &|placeholder| self.value(placeholder, event.metadata(), since, &message));
-        if let Some(lines) = &self.lines {
+        if let Some(topic) = &self.topic {
             // Where they are not taken the latest are lost: a log never waits.
-            let _ = lines.try_send(self.record(event.metadata(), since, message));
+            let _ = topic.try_send(self.record(event.metadata(), since, message));
         }
         writeln!(writer, "{line}")
     }
@@ -264,14 +269,13 @@ mod tests {
 
     #[test]
     fn an_unset_level_returns_to_the_filter_of_the_start() {
-        let first = (Severity::Warn, "flockform=warn,rustdds=debug".to_owned());
+        let targets = |filter: &str| filter.parse::<Targets>().expect("targets and their levels");
+        let first = (Severity::Warn, targets("flockform=warn,rustdds=debug"));
         let log =
             NodeLog { severity: Mutex::new(first.0), first: first.clone(), filter: Box::new(|_| Ok(())) };
         assert_eq!(log.of(Severity::Unset), first);
-        let debug = (Severity::Debug, "flockform=debug,rustdds=error,ros2_client=error".to_owned());
+        let debug = (Severity::Debug, targets("flockform=debug,rustdds=error,ros2_client=error"));
         assert_eq!(log.of(Severity::Debug), debug);
-        let filter = EnvFilter::from(first.1.as_str()).to_string();
-        assert_eq!(EnvFilter::from(filter.as_str()).to_string(), filter, "its text is a filter again");
     }
 
     #[test]

@@ -117,6 +117,9 @@ impl Engine {
     }
 
     /// The body before its first step, with the roles and the part of the loads that hold from the start.
+    ///
+    /// # Panics
+    /// If particles and roles are not as many.
     pub fn new(setup: Setup) -> Self {
         let Setup {
             body,
@@ -134,6 +137,7 @@ impl Engine {
             free_edge,
             probes,
         } = setup;
+        assert_eq!(roles.len(), body.reference.len(), "roles, for so many particles");
         let present_neighbours = present_radius.map(|radius| PresentNeighbours {
             radius,
             grid: CellGrid::default(),

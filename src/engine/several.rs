@@ -103,8 +103,8 @@ impl StepBatch {
 }
 
 impl Engine {
-    /// How many steps, at most `most`, can be taken by [`Engine::advance_by`] from here; 0 where the next one
-    /// must be taken by [`Engine::advance`]: a frame that looks after the sweep, bonds that may break, neighbours
+    /// How many steps, at most `most`, [`Engine::advance_steps`] takes at once from here; 0 where the next one
+    /// is taken by itself: a frame that looks after the sweep, bonds that may break, neighbours
     /// found anew and roles that change look at every step.
     pub fn steps_at_once(&self, most: usize) -> usize {
         let finds_neighbours = self.present_neighbours.is_some();
@@ -129,10 +129,28 @@ impl Engine {
         usize::from(self.probes.is_some() && self.sweep.domain().is_some())
     }
 
-    /// Takes so many steps, as many as [`Engine::steps_at_once`] allows; the bits are those of single ones. More than that would leave
-    /// out what is due in between.
+    /// Moves the body by so many steps, several at once where nothing looks at it in between; the bits are those of single ones.
+    pub fn advance_steps(&mut self, count: usize) {
+        let mut to_go = count;
+        while to_go > 0 {
+            to_go -= self.advance_at_most(to_go);
+        }
+    }
+
+    /// Takes as many steps as can be taken at once, at least one and at most `most`; returns how many.
+    pub(crate) fn advance_at_most(&mut self, most: usize) -> usize {
+        let count = self.steps_at_once(most);
+        if count == 0 {
+            self.advance();
+        } else {
+            self.advance_by(count, None);
+        }
+        count.max(1)
+    }
+
+    /// Takes so many steps, as many as [`Engine::steps_at_once`] allows; more than that would leave out what is due in between.
     /// Returns for each whether a particle is known to have moved farther in it than `farther` \[length\].
-    pub fn advance_by(&mut self, count: usize, farther: Option<f64>) -> Vec<bool> {
+    pub(crate) fn advance_by(&mut self, count: usize, farther: Option<f64>) -> Vec<bool> {
         if count == 0 {
             return Vec::new();
         }

@@ -211,9 +211,10 @@ impl<'a> EngineState<'a> {
         require("particles that changes took", self.taken_by.len(), engine.taken_by.len())?;
         let bits = engine.flock.bonds.as_ref().map(|_| engine.flock.neighbours.index.len().div_ceil(8));
         require("bytes of bonds", self.broken.as_ref().map_or(0, Vec::len), bits.unwrap_or(0))?;
-        // A number from a file is an index only when it is below what it counts.
-        let require_below = |what, found: usize, planned: usize| {
-            if found < planned { Ok(()) } else { Err(WrongState { what, found, planned }) }
+        // A number from a file is an index only when it is below what it counts; one that is not says that there are more.
+        let require_below = |what, index: usize, planned: usize| {
+            let found = index.saturating_add(1);
+            if index < planned { Ok(()) } else { Err(WrongState { what, found, planned }) }
         };
         for led in &self.leaders {
             require_below("role changes", led.change, engine.changes.len())?;

@@ -41,7 +41,7 @@ fn main() -> Result<(), SceneError> {
         } else if number == SECONDS * FRAMES / 2 {
             engine.add_role_change(RoleChange::new(held.clone(), Role::Follower, engine.step() + 1));
         }
-        (0..STEPS_A_FRAME).for_each(|_| engine.advance());
+        engine.advance_steps(STEPS_A_FRAME);
         // Here a program draws `engine.present()`.
         busy += begun.elapsed();
         std::thread::sleep(frame.saturating_sub(begun.elapsed()));

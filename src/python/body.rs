@@ -54,10 +54,7 @@ impl Body {
     fn go(&mut self, end: usize) -> Option<Divergence> {
         let begun = Instant::now();
         while self.engine.step() < end && begun.elapsed() < BETWEEN_LOOKS {
-            match self.engine.steps_at_once(end - self.engine.step()) {
-                0 => self.engine.advance(),
-                count => drop(self.engine.advance_by(count, None)),
-            }
+            self.engine.advance_at_most(end - self.engine.step());
             // After every batch, so that the step of it does not depend on the clock.
             let divergence = overflow(&self.engine);
             if divergence.is_some() {

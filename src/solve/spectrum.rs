@@ -55,6 +55,9 @@ impl<'a> LinearSweep<'a> {
     ///
     /// `None` where the sweep is not linear (weights that depend on distance, power means, corotation), where a material has a
     /// Poisson term besides, or where no particle follows.
+    ///
+    /// # Panics
+    /// If particles and roles are not as many.
     pub fn new(
         flock: &Flock,
         frame: Option<&'a Frame>,
@@ -62,6 +65,7 @@ impl<'a> LinearSweep<'a> {
         update: Update,
         most: usize,
     ) -> Option<Self> {
+        assert_eq!(roles.len(), flock.reference.len(), "roles, for so many particles");
         let linear =
             matches!(flock.rule.mean, Mean::Barycentre | Mean::Material { rotation: Rotation::Small });
         let couples = flock.rule.mean != Mean::Barycentre && flock.rule.poisson.is_some();
@@ -106,7 +110,10 @@ impl<'a> LinearSweep<'a> {
         /// Most particles swept and numbers made orthogonal, these at 50 of the others each, in all: more would take seconds.
         const MOST_WORK: usize = 100_000_000;
         let count = self.roles.len();
-        let most = self.most.min(MOST_WORK / (count * (sweeps + 50 * (delay + 1))));
+        let most = self.most.min(
+            MOST_WORK
+                / count.saturating_mul(delay.saturating_add(1).saturating_mul(50).saturating_add(sweeps)),
+        );
         let found = self.eigenvalues(sweeps, delay, (Wanted::Modulus, Accuracy::FromOne(1e-4)), most);
         found.converged.then(|| found.eigenvalues[0].value.norm())
     }

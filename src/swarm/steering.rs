@@ -43,7 +43,11 @@ pub struct Steering {
 
 impl Steering {
     /// Of a robot that turns no faster than `turn_rate` \[rad/s\] and cannot go sideways; `None` of one that can.
+    ///
+    /// # Panics
+    /// A rate that is no number or negative.
     pub fn new(turn_rate: Option<f64>) -> Self {
+        assert!(turn_rate.is_none_or(|rate| rate >= 0.0), "turn rate {turn_rate:?}");
         Self { turn_rate, ..Self::default() }
     }
 

@@ -184,13 +184,7 @@ pub fn engine(plan: &Plan, team: Option<Team>) -> Engine {
 pub fn step(engine: &mut Engine, steps: usize, most: usize) {
     let mut to_go = steps;
     while to_go > 0 {
-        let together = engine.steps_at_once(to_go.min(most));
-        if together == 0 {
-            engine.advance();
-        } else {
-            engine.advance_by(together, None);
-        }
-        to_go -= together.max(1);
+        to_go -= engine.advance_at_most(to_go.min(most));
     }
 }
 

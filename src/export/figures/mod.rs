@@ -18,6 +18,7 @@ mod faces;
 #[cfg(feature = "swarm")]
 pub(crate) mod flight_map;
 pub(super) mod heading;
+mod letters;
 pub(super) mod page;
 pub(super) mod panels;
 pub(super) mod png;

@@ -1,13 +1,13 @@
 //! An SVG becomes pixels, or a PNG, with the font that the program carries.
 
-use std::sync::Arc;
-
 use resvg::tiny_skia::{Color, Pixmap, Transform};
-use resvg::usvg::{Options, Tree, fontdb};
+use resvg::usvg::{Options, Tree};
+
+use super::letters::Letters;
 
 /// Renders with as many pixels for a \[px\] of the sheet as `zoom` says of its width. The error is a reason.
 pub fn render(svg: &str, zoom: impl FnOnce(f32) -> f32) -> Result<Vec<u8>, String> {
-    let tree = Tree::from_str(svg, &options()).map_err(|error| error.to_string())?;
+    let tree = tree(svg, &Letters::new())?;
     let zoom = zoom(tree.size().width());
     let size = [tree.size().width(), tree.size().height()].map(|length| (zoom * length).round() as u32);
     let Picture { rgba, .. } = picture(tree, zoom, size)?;
@@ -25,11 +25,8 @@ fn encoded([width, height]: [u32; 2], rgba: &[u8]) -> Result<Vec<u8>, png::Encod
     Ok(file)
 }
 
-fn options() -> Options<'static> {
-    let mut options = Options { font_family: "DejaVu Sans".into(), ..Options::default() };
-    let font = fontdb::Source::Binary(Arc::new(dejavu::sans::regular()));
-    options.fontdb_mut().load_font_source(font);
-    options
+fn tree(svg: &str, letters: &Letters) -> Result<Tree, String> {
+    Tree::from_str(&letters.outlined(svg), &Options::default()).map_err(|error| error.to_string())
 }
 
 /// A sheet on white paper; the tree goes before anything is made of its picture.
@@ -44,7 +41,7 @@ fn picture(tree: Tree, zoom: f32, size: [u32; 2]) -> Result<Picture, String> {
 
 /// Renders many sheets, with the font read once.
 pub struct Painter {
-    options: Options<'static>,
+    letters: Letters,
     /// Pixels for a \[px\] of the sheet.
     zoom: f32,
 }
@@ -59,12 +56,12 @@ pub struct Picture {
 
 impl Painter {
     pub fn new(zoom: f32) -> Self {
-        Self { options: options(), zoom }
+        Self { letters: Letters::new(), zoom }
     }
 
     /// The error is a reason.
     pub fn paint(&self, svg: &str) -> Result<Picture, String> {
-        let tree = Tree::from_str(svg, &self.options).map_err(|error| error.to_string())?;
+        let tree = tree(svg, &self.letters)?;
         let even = |length: f32| 2 * (0.5 * self.zoom * length).ceil() as u32;
         let size = [even(tree.size().width()), even(tree.size().height())];
         picture(tree, self.zoom, size)

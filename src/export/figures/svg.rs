@@ -1,6 +1,7 @@
 //! SVG elements, as text.
 
-use std::fmt::{Display, Write};
+use std::borrow::Cow;
+use std::fmt::{self, Display, Formatter, Write};
 
 /// First choice and fallback; the PNG is rendered with the first, which the program carries.
 pub const FONT: &str = "DejaVu Sans, Verdana, sans-serif";
@@ -20,6 +21,16 @@ pub enum Anchor {
     Start,
     Middle,
     End,
+}
+
+impl Anchor {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Start => "start",
+            Self::Middle => "middle",
+            Self::End => "end",
+        }
+    }
 }
 
 impl Svg {
@@ -95,44 +106,82 @@ impl Svg {
 
     /// One line of text, centred on the height of `at`.
     pub fn text(&mut self, at: [f64; 2], anchor: Anchor, size: f64, colour: &str, content: &str) {
-        self.turned_text(at, anchor, size, colour, content, "");
+        let content = content.into();
+        self.push(Text { at, anchor, size, colour, reads_upwards: false, content });
     }
 
     /// Text that reads upwards, centred on `at`.
     pub fn upward_text(&mut self, at: [f64; 2], size: f64, content: &str) {
-        let turn = format!(" transform=\"rotate(-90 {:.2} {:.2})\"", at[0], at[1]);
-        self.turned_text(at, Anchor::Middle, size, INK, content, &turn);
-    }
-
-    fn turned_text(
-        &mut self,
-        [x, y]: [f64; 2],
-        anchor: Anchor,
-        size: f64,
-        colour: &str,
-        content: &str,
-        turn: &str,
-    ) {
-        let anchor = match anchor {
-            Anchor::Start => "start",
-            Anchor::Middle => "middle",
-            Anchor::End => "end",
-        };
-        // Half the height of a capital, since renderers disagree on `dominant-baseline`.
-        let rise = 0.36 * size;
-        self.push(format_args!(
-            "<text x=\"{x:.2}\" y=\"{y:.2}\" dy=\"{rise:.2}\" text-anchor=\"{anchor}\" font-size=\"{size}\" \
-             fill=\"{colour}\"{turn}>{}</text>",
-            // XML 1.0 has no place for control characters and these two, not even as references.
-            escaped(
-                &content.replace(|c: char| c.is_control() || ('\u{fffe}'..='\u{ffff}').contains(&c), " ")
-            )
-        ));
+        let content = content.into();
+        self.push(Text { at, anchor: Anchor::Middle, size, colour: INK, reads_upwards: true, content });
     }
 
     fn push(&mut self, element: impl Display) {
         // Writing to a string cannot fail.
         let _ = writeln!(self.text, "{element}");
+    }
+}
+
+/// One line of text on a sheet.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Text<'a> {
+    /// The middle of its height \[px\].
+    pub at: [f64; 2],
+    pub anchor: Anchor,
+    /// \[px\]
+    pub size: f64,
+    pub colour: &'a str,
+    pub reads_upwards: bool,
+    pub content: Cow<'a, str>,
+}
+
+impl<'a> Text<'a> {
+    /// The text of a line of a sheet, if it is one.
+    pub fn read(line: &'a str) -> Option<Self> {
+        let (attributes, content) = line.strip_prefix("<text ")?.strip_suffix("</text>")?.split_once('>')?;
+        let attribute = |name: &str| {
+            let mut pairs = attributes.split_inclusive("\" ").filter_map(|pair| pair.split_once("=\""));
+            pairs.find(|pair| pair.0 == name).map(|(_, value)| value.trim_end_matches(['"', ' ']))
+        };
+        let number = |name| attribute(name)?.parse().ok();
+        let anchors = [Anchor::Start, Anchor::Middle, Anchor::End];
+        Some(Self {
+            at: [number("x")?, number("y")?],
+            anchor: anchors.into_iter().find(|anchor| attribute("text-anchor") == Some(anchor.name()))?,
+            size: number("font-size")?,
+            colour: attribute("fill")?,
+            reads_upwards: attribute("transform").is_some(),
+            content: unescaped(content).into(),
+        })
+    }
+
+    /// From the middle of its height down to its base line \[px\]: half the height of a capital, since renderers disagree on
+    /// `dominant-baseline`.
+    pub fn rise(&self) -> f64 {
+        0.36 * self.size
+    }
+
+    /// The attribute that turns it.
+    pub fn turn(&self) -> String {
+        let [x, y] = self.at;
+        if self.reads_upwards { format!(" transform=\"rotate(-90 {x:.2} {y:.2})\"") } else { String::new() }
+    }
+}
+
+impl Display for Text<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { at: [x, y], anchor, size, colour, content, .. } = self;
+        // XML 1.0 has no place for control characters and these two, not even as references.
+        let is_none = |c: char| c.is_control() || ('\u{fffe}'..='\u{ffff}').contains(&c);
+        write!(
+            f,
+            "<text x=\"{x:.2}\" y=\"{y:.2}\" dy=\"{:.2}\" text-anchor=\"{}\" font-size=\"{size}\" \
+             fill=\"{colour}\"{}>{}</text>",
+            self.rise(),
+            anchor.name(),
+            self.turn(),
+            escaped(&content.replace(is_none, " "))
+        )
     }
 }
 
@@ -182,6 +231,10 @@ pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
+fn unescaped(text: &str) -> String {
+    text.replace("&quot;", "\"").replace("&gt;", ">").replace("&lt;", "<").replace("&amp;", "&")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -191,5 +244,21 @@ mod tests {
         let mut svg = Svg::new(10.0, 10.0);
         svg.text([1.0, 2.0], Anchor::Start, 12.0, INK, "a < b & \u{1} </text>");
         assert!(svg.finish().contains(">a &lt; b &amp;   &lt;/text&gt;</text>"));
+    }
+
+    #[test]
+    fn a_text_is_read_as_it_was_written() {
+        let text = Text {
+            at: [1.25, -2.5],
+            anchor: Anchor::End,
+            size: 11.5,
+            colour: INK,
+            reads_upwards: true,
+            content: "&lt; fill=\"x\" > x=\"9\" </text>".into(),
+        };
+        for text in [text.clone(), Text { reads_upwards: false, ..text }] {
+            assert_eq!(Text::read(&text.to_string()), Some(text));
+        }
+        assert_eq!(Text::read("<rect x=\"1\"/>"), None);
     }
 }
