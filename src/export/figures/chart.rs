@@ -264,7 +264,7 @@ fn vertical_ticks(chart: &Chart, axes: &Axes) -> (Vec<(f64, String)>, String) {
 
 fn room_on_the_left(chart: &Chart, axes: &Axes) -> f64 {
     let (marks, _) = vertical_ticks(chart, axes);
-    let widest = marks.iter().map(|(_, label)| super::svg::text_width(label, TEXT)).fold(0.0, f64::max);
+    let widest = marks.iter().map(|(_, label)| super::letters::text_width(label, TEXT)).fold(0.0, f64::max);
     widest + TICK + 36.0
 }
 

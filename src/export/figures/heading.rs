@@ -2,7 +2,8 @@
 
 use std::borrow::Cow;
 
-use super::svg::{Anchor, INK, Path, Svg, text_width};
+use super::letters::text_width;
+use super::svg::{Anchor, INK, Path, Svg};
 
 const TITLE_TEXT: f64 = 16.0;
 const NOTE_TEXT: f64 = 13.0;

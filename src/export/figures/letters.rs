@@ -1,11 +1,13 @@
 //! Texts of a sheet become outlines of letters, in the font that the program carries: what a picture is painted from.
 //!
-//! Letters stand one after the other, from left to right, closer where the font says so. A script whose letters depend on those
-//! beside them, or that runs the other way, is left to what shows the SVG.
+//! Letters stand one after the other, from left to right, closer where the font says so. Those of scripts that run the other way are
+//! boxes, as are those that the font has not: a word that is drawn backwards looks right to a reader of other scripts.
 
 use std::fmt::Write;
+use std::sync::LazyLock;
 
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
+use unicode_normalization::UnicodeNormalization;
 
 use super::svg::{Anchor, Text};
 
@@ -14,9 +16,25 @@ pub struct Letters {
     face: Face<'static>,
 }
 
+/// Width of a text \[px\].
+pub fn text_width(content: &str, size: f64) -> f64 {
+    LETTERS.width(&LETTERS.letters(content)) * LETTERS.scale(size)
+}
+
+/// Those of the program.
+pub static LETTERS: LazyLock<Letters> = LazyLock::new(|| Letters {
+    face: Face::parse(dejavu::sans::regular(), 0).expect("the font that is carried can be read"),
+});
+
 impl Letters {
-    pub fn new() -> Self {
-        Self { face: Face::parse(dejavu::sans::regular(), 0).expect("the font that is carried can be read") }
+    /// Of a unit of the font, for text of this size \[px\].
+    fn scale(&self, size: f64) -> f64 {
+        size / f64::from(self.face.units_per_em())
+    }
+
+    /// In units of the font.
+    fn width(&self, letters: &[(GlyphId, f64)]) -> f64 {
+        letters.last().map_or(0.0, |&(letter, at)| at + self.advance(letter))
     }
 
     /// The sheet with the outline of each text in its place.
@@ -33,9 +51,8 @@ impl Letters {
     }
 
     fn outline(&self, text: &Text<'_>) -> String {
-        let scale = text.size / f64::from(self.face.units_per_em());
-        let letters = self.letters(&text.content);
-        let width = letters.last().map_or(0.0, |&(letter, at)| at + self.advance(letter)) * scale;
+        let (scale, letters) = (self.scale(text.size), self.letters(&text.content));
+        let width = self.width(&letters) * scale;
         let before = match text.anchor {
             Anchor::Start => 0.0,
             Anchor::Middle => 0.5 * width,
@@ -51,11 +68,11 @@ impl Letters {
         format!("<path fill=\"{}\"{} d=\"{}\"/>", text.colour, text.turn(), outline.path)
     }
 
-    /// Each with where it begins, in units of the font; a box for one that the font has not.
+    /// Each with where it begins, in units of the font; a letter and its accent are one.
     fn letters(&self, content: &str) -> Vec<(GlyphId, f64)> {
         let mut letters: Vec<(GlyphId, f64)> = Vec::new();
-        for c in content.chars() {
-            let letter = self.face.glyph_index(c).unwrap_or_default();
+        for c in content.nfc() {
+            let letter = self.face.glyph_index(c).filter(|_| !runs_leftwards(c)).unwrap_or_default();
             let at = letters
                 .last()
                 .map_or(0.0, |&(last, at)| at + self.advance(last) + self.kerning(last, letter));
@@ -72,6 +89,11 @@ impl Letters {
         let tables = self.face.tables().kern.into_iter().flat_map(|kern| kern.subtables);
         tables.filter_map(|table| table.glyphs_kerning(left, right)).map(f64::from).sum()
     }
+}
+
+/// Whether it is of Hebrew, Arabic or another script that runs from right to left.
+fn runs_leftwards(c: char) -> bool {
+    matches!(c, '\u{590}'..='\u{8ff}' | '\u{fb1d}'..='\u{fdff}' | '\u{fe70}'..='\u{fefc}' | '\u{10800}'..='\u{10fff}')
 }
 
 /// The `d` of letters; the font's y points up.
@@ -120,7 +142,7 @@ impl OutlineBuilder for Outline {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::figures::svg::{INK, Svg, text_width};
+    use crate::export::figures::svg::{INK, Svg};
 
     #[test]
     fn texts_are_outlines_where_they_stood_and_all_else_is_left_as_it_is() {
@@ -131,10 +153,9 @@ mod tests {
             svg.text([100.0, 20.0], anchor, 12.0, INK, TEXT);
             svg.finish()
         };
-        let letters = Letters::new();
         // The least and the greatest x of the outline.
         let ends = |anchor| {
-            let outlined = letters.outlined(&sheet(anchor));
+            let outlined = LETTERS.outlined(&sheet(anchor));
             assert!(!outlined.contains("<text") && outlined.contains("<circle"), "{outlined}");
             let path =
                 outlined.split(" d=\"").nth(1).expect("a path").split('"').next().expect("its d").to_owned();
@@ -153,8 +174,17 @@ mod tests {
 
     #[test]
     fn letters_stand_closer_where_the_font_says_so() {
-        let letters = Letters::new();
-        let second = |content| letters.letters(content)[1].1;
+        let second = |content| LETTERS.letters(content)[1].1;
         assert!(second("AV") < second("AH"));
+    }
+
+    #[test]
+    fn accents_are_of_their_letters_and_what_would_be_drawn_backwards_is_boxes() {
+        assert_eq!(LETTERS.letters("U\u{308}ber E\u{301}"), LETTERS.letters("\u{dc}ber \u{c9}"));
+        let of =
+            |content| LETTERS.letters(content).into_iter().map(|(letter, _)| letter.0).collect::<Vec<_>>();
+        assert_eq!(of("\u{5e9}\u{644}"), [0, 0]);
+        assert!(!of("\u{416}\u{3a9}\u{dc}").contains(&0));
+        assert!(text_width("\u{416}", 100.0) > 100.0, "wider than any that is written in English");
     }
 }

@@ -3,8 +3,9 @@
 use super::axes::{Axes, Measure};
 use super::colour::{blue_to_red, viridis};
 use super::heading::Heading;
+use super::letters::text_width;
 use super::raster::Raster;
-use super::svg::{Anchor, INK, Svg, text_width};
+use super::svg::{Anchor, INK, Svg};
 use super::ticks::Ticks;
 use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;

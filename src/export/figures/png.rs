@@ -3,11 +3,11 @@
 use resvg::tiny_skia::{Color, Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
 
-use super::letters::Letters;
+use super::letters::LETTERS;
 
 /// Renders with as many pixels for a \[px\] of the sheet as `zoom` says of its width. The error is a reason.
 pub fn render(svg: &str, zoom: impl FnOnce(f32) -> f32) -> Result<Vec<u8>, String> {
-    let tree = tree(svg, &Letters::new())?;
+    let tree = tree(svg)?;
     let zoom = zoom(tree.size().width());
     let size = [tree.size().width(), tree.size().height()].map(|length| (zoom * length).round() as u32);
     let Picture { rgba, .. } = picture(tree, zoom, size)?;
@@ -25,8 +25,8 @@ fn encoded([width, height]: [u32; 2], rgba: &[u8]) -> Result<Vec<u8>, png::Encod
     Ok(file)
 }
 
-fn tree(svg: &str, letters: &Letters) -> Result<Tree, String> {
-    Tree::from_str(&letters.outlined(svg), &Options::default()).map_err(|error| error.to_string())
+fn tree(svg: &str) -> Result<Tree, String> {
+    Tree::from_str(&LETTERS.outlined(svg), &Options::default()).map_err(|error| error.to_string())
 }
 
 /// A sheet on white paper; the tree goes before anything is made of its picture.
@@ -39,13 +39,6 @@ fn picture(tree: Tree, zoom: f32, size: [u32; 2]) -> Result<Picture, String> {
     Ok(Picture { size, rgba: pixmap.take() })
 }
 
-/// Renders many sheets, with the font read once.
-pub struct Painter {
-    letters: Letters,
-    /// Pixels for a \[px\] of the sheet.
-    zoom: f32,
-}
-
 /// An opaque picture of an even number of pixels each way, as videos ask for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
@@ -54,16 +47,10 @@ pub struct Picture {
     pub rgba: Vec<u8>,
 }
 
-impl Painter {
-    pub fn new(zoom: f32) -> Self {
-        Self { letters: Letters::new(), zoom }
-    }
-
-    /// The error is a reason.
-    pub fn paint(&self, svg: &str) -> Result<Picture, String> {
-        let tree = tree(svg, &self.letters)?;
-        let even = |length: f32| 2 * (0.5 * self.zoom * length).ceil() as u32;
-        let size = [even(tree.size().width()), even(tree.size().height())];
-        picture(tree, self.zoom, size)
-    }
+/// Paints a sheet with `zoom` pixels for each of its \[px\]. The error is a reason.
+pub fn paint(svg: &str, zoom: f32) -> Result<Picture, String> {
+    let tree = tree(svg)?;
+    let even = |length: f32| 2 * (0.5 * zoom * length).ceil() as u32;
+    let size = [even(tree.size().width()), even(tree.size().height())];
+    picture(tree, zoom, size)
 }

@@ -211,21 +211,6 @@ impl Path {
     }
 }
 
-/// Advance of DejaVu Sans for each character from the space to the tilde \[1/100 of the size\].
-const ADVANCES: [u8; 95] = [
-    32, 40, 46, 84, 64, 95, 78, 27, 39, 39, 50, 84, 32, 36, 32, 34, 64, 64, 64, 64, 64, 64, 64, 64, 64, 64,
-    34, 34, 84, 84, 84, 53, 100, 68, 69, 70, 77, 63, 58, 77, 75, 29, 29, 66, 56, 86, 75, 79, 60, 79, 69, 63,
-    61, 73, 68, 99, 69, 61, 69, 39, 34, 39, 84, 50, 50, 61, 63, 55, 63, 62, 35, 63, 63, 28, 28, 58, 28, 97,
-    63, 61, 63, 63, 41, 52, 39, 63, 59, 82, 59, 59, 52, 64, 34, 64, 84,
-];
-
-/// Width of a text \[px\].
-pub fn text_width(content: &str, size: f64) -> f64 {
-    // Characters outside the table are as wide as a minus sign at most, ideographs apart.
-    let advance = |c: char| (c as usize).checked_sub(32).and_then(|n| ADVANCES.get(n)).map_or(84, |&a| a);
-    content.chars().map(|c| f64::from(advance(c))).sum::<f64>() * size / 100.0
-}
-
 /// A text within markup or a quoted attribute.
 pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")

@@ -5,8 +5,9 @@ use super::bands::Bands;
 use super::chart::{Axis, Chart, Series, Style, draw_below_each_other, room};
 use super::colour::{SERIES, viridis};
 use super::heading::Heading;
+use super::letters::text_width;
 use super::page;
-use super::svg::{Anchor, INK, Path, Svg, text_width};
+use super::svg::{Anchor, INK, Path, Svg};
 use super::ticks::Ticks;
 use crate::study::design::{Factor, Level};
 

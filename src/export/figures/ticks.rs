@@ -1,6 +1,6 @@
 //! Round values along an axis, and how they are written.
 
-use super::svg::text_width;
+use super::letters::text_width;
 
 /// Values at multiples of 1, 2 or 5 times a power of ten.
 #[derive(Clone, Debug, PartialEq)]

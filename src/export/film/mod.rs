@@ -20,7 +20,7 @@ use std::path::PathBuf;
 
 use rayon::prelude::*;
 
-use super::figures::png::{Painter, Picture};
+use super::figures::png::{self, Picture};
 pub use error::FilmError;
 pub use place::{FilmFile, FilmFormat};
 
@@ -108,9 +108,9 @@ impl Film<'_> {
         file: FilmFile,
         progress: &dyn Fn(usize, usize) -> ControlFlow<()>,
     ) -> Result<Option<Finished>, FilmError> {
-        let painter = Painter::new(file.zoom());
+        let zoom = file.zoom();
         let paint = |frame: usize| {
-            painter.paint(&(self.draw)(frame)).map_err(|reason| FilmError::Frame { frame, reason })
+            png::paint(&(self.draw)(frame), zoom).map_err(|reason| FilmError::Frame { frame, reason })
         };
         let time = frame_time(self.count);
         let mut encoder = file.encoder(self.count, time, &paint)?;

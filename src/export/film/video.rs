@@ -80,6 +80,9 @@ impl VideoEncoder {
         command.args(["-hide_banner", "-loglevel", "error", "-nostdin", "-y"]);
         command.args(["-f", "rawvideo", "-pix_fmt", "rgba", "-video_size", &format!("{width}x{height}")]);
         command.args(["-framerate", &format!("100/{time}"), "-i", "pipe:0", "-an", "-c:v", codec]);
+        // Players take colours that are not named to be of one standard or of the other.
+        command.args(["-vf", "scale=out_color_matrix=bt709:out_range=tv", "-color_range", "tv"]);
+        command.args(["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"]);
         command.args(options).args(["-pix_fmt", "yuv420p"]).args(more).args(["-f", container]);
         // An absolute path, which no option and no protocol begins with.
         command.arg(path).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());

@@ -263,7 +263,7 @@ fn note(animation: &Animation, report: &FlightReport) -> String {
     let all = if shown as u64 > report.periods { "all".to_owned() } else { format!("{shown} of them are") };
     format!(
         "{} periods flown, {all} shown. Lines join neighbours at the start. At the last frame places, ways and \
-         least clearances are those of robots.csv, to the last digit.",
+         least clearances are those of robots.csv, as far as their digits are shown.",
         report.periods
     )
 }

@@ -123,7 +123,7 @@ fn note(stage: &View, outcome: &Outcome, is_solved: bool) -> String {
     note += if animation.exact.is_empty() {
         " The body is too large for its last numbers to be kept exactly: final.csv has them."
     } else {
-        " At the last frame the numbers are those of final.csv, to the last digit."
+        " At the last frame the numbers are those of final.csv, as far as their digits are shown."
     };
     note
 }

@@ -222,7 +222,7 @@ export class View {
     const [halfWidth, halfHeight] = [this.width / 2 / camera.scale, this.height / 2 / camera.scale];
     // On a phone too there are two of them, whose distance is that of the others.
     const across = ticks(camera.x - halfWidth, camera.x + halfWidth, Math.max(this.width / 110, 4));
-    const step = across.length > 1 ? across[1] - across[0] : 1;
+    const step = across.length > 1 ? Number((across[1] - across[0]).toPrecision(2)) : 1;
     const up = across.length > 1 ? multiples(camera.y - halfHeight, camera.y + halfHeight, step) : [];
     pen.lineWidth = 1;
     pen.strokeStyle = themeText("grid");
