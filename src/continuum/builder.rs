@@ -201,6 +201,22 @@ mod tests {
     }
 
     #[test]
+    fn a_particle_of_which_one_component_is_held_is_not_led_by_hand_and_goes_back_to_its_hold() {
+        let held =
+            "roles=[{ region = { kind = \"edge\", side = \"left\" }, role = \"clamped\", axis = \"x\" }]";
+        let sheet =
+            Builder::new(LatticeKind::Square { spacing: 1.0 }).grid(6, 3).material(1000.0, 0.3).set(held);
+        let mut engine = sheet.engine().expect("laid out");
+        engine.lead(0, [0.5, 0.0]);
+        engine.advance();
+        assert!(engine.displacement(0)[0].abs() < 1e-12, "{:?}", engine.displacement(0));
+        engine.observe([(0, [0.5, 0.0])]);
+        engine.advance();
+        let left = 0.5 * (1.0 - engine.update().damping);
+        assert!((engine.displacement(0)[0] - left).abs() < 1e-12, "{:?}", engine.displacement(0));
+    }
+
+    #[test]
     fn a_body_that_a_solver_would_put_to_rest_can_be_stepped_as_any() {
         let sheet = Builder::new(LatticeKind::Hexagonal { spacing: 1.0 })
             .rectangle([12.0, 10.0])
