@@ -85,7 +85,7 @@ impl Builder {
     }
 
     /// Isotropic, in plane stress, of thickness 1; `young` \[force / length^2\] is Young's modulus, `poisson` \[1\] Poisson's ratio.
-    /// The rule becomes that of the material.
+    /// The rule becomes that of the material, in place of what has been set before of `rule.mean`: what is to differ is set after it.
     pub fn material(self, young: f64, poisson: f64) -> Self {
         let (young, poisson) = (toml(young), toml(poisson));
         self.set(format!("material={{kind=\"isotropic\",young={young},poisson={poisson}}}"))
