@@ -85,7 +85,7 @@ impl Builder {
     }
 
     /// Isotropic, in plane stress, of thickness 1; `young` \[force / length^2\] is Young's modulus, `poisson` \[1\] Poisson's ratio.
-    /// The rule becomes that of the material.
+    /// The rule becomes that of the material, in place of what has been set before of `rule.mean`: what is to differ is set after it.
     pub fn material(self, young: f64, poisson: f64) -> Self {
         let (young, poisson) = (toml(young), toml(poisson));
         self.set(format!("material={{kind=\"isotropic\",young={young},poisson={poisson}}}"))
@@ -198,6 +198,22 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_particle_of_which_one_component_is_held_is_not_led_by_hand_and_goes_back_to_its_hold() {
+        let held =
+            "roles=[{ region = { kind = \"edge\", side = \"left\" }, role = \"clamped\", axis = \"x\" }]";
+        let sheet =
+            Builder::new(LatticeKind::Square { spacing: 1.0 }).grid(6, 3).material(1000.0, 0.3).set(held);
+        let mut engine = sheet.engine().expect("laid out");
+        engine.lead(0, [0.5, 0.0]);
+        engine.advance();
+        assert!(engine.displacement(0)[0].abs() < 1e-12, "{:?}", engine.displacement(0));
+        engine.observe([(0, [0.5, 0.0])]);
+        engine.advance();
+        let left = 0.5 * (1.0 - engine.update().damping);
+        assert!((engine.displacement(0)[0] - left).abs() < 1e-12, "{:?}", engine.displacement(0));
     }
 
     #[test]

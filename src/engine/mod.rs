@@ -341,6 +341,9 @@ impl Engine {
 
     /// Puts particles where they have been seen \[length\], in place of where the last step sent them; frame
     /// points follow. A body whose particles are seen where they were sent goes on as if it had not been observed.
+    /// A leader or a clamped particle stays where it was seen, unless a program of its own leads it; one of which a single
+    /// component is held ([`RoleChange::axis`]) goes back to that hold: at once where it has a motion, else in each step by the
+    /// part of the way that the damping is.
     ///
     /// # Panics
     /// If there is no such particle.
@@ -360,7 +363,8 @@ impl Engine {
     }
 
     /// Puts a leader or a clamped particle at `place` \[length\] in the next step. There it stays, unless a program of its own leads it,
-    /// also one that has come to its end; a follower is not to be led and goes its way.
+    /// also one that has come to its end; a follower is not to be led and goes its way, and so does a particle of which a single
+    /// component is held ([`RoleChange::axis`]), which follows along the other.
     ///
     /// # Panics
     /// If there is no such particle.

@@ -44,7 +44,8 @@ impl ProbeSeries {
 }
 
 impl Engine {
-    /// The histories that the engine records itself: of the particles of this part alone.
+    /// The histories that the engine records itself: of the particles of this part alone, and none of a whole body. There the
+    /// recorder of a run has those that the scene asks for; of a body that is stepped by hand [`ProbeSeries::record`] makes them.
     pub fn probes(&self) -> &[ProbeSeries] {
         self.probes.as_deref().unwrap_or_default()
     }

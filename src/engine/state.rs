@@ -45,7 +45,7 @@ pub struct EngineState<'a> {
 
 /// A state that belongs to another plan.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the state has {found} {what}, the plan {planned}: it belongs to another body")]
+#[error("the state has {found} {what}, the plan {planned}: it belongs to another body{}", self.or_to_a_change())]
 pub struct WrongState {
     /// The quantity that is counted.
     pub what: &'static str,
@@ -55,9 +55,29 @@ pub struct WrongState {
     pub planned: usize,
 }
 
+const CHANGES: &str = "role changes";
+const TAKEN: &str = "particles that changes took";
+
+impl WrongState {
+    /// The other cause where there are more role changes than planned.
+    fn or_to_a_change(&self) -> &'static str {
+        if [CHANGES, TAKEN].contains(&self.what) && self.found > self.planned {
+            ", or to this one with role changes that were added by hand, which no state has\n  \
+             help: add them to the changes of the plan's setup before it takes the state"
+        } else {
+            ""
+        }
+    }
+}
+
 impl<'a> EngineState<'a> {
     /// The state of an engine between two steps; of a part of a body that of its own particles, which are numbered as in the
     /// whole body.
+    ///
+    /// It has nothing that was given by hand beside a plan but broken bonds and places: role changes that were added
+    /// ([`Engine::add_role_change`], to be added to [`Setup::changes`] of the plan that takes the state), motions that were
+    /// steered, a damping, a rule that was performed. Nor has it histories of probes, and of a body that was put to rest neither
+    /// the increments that led there nor the digits of displacements that its places have lost.
     pub fn of(engine: &'a Engine) -> Self {
         let (body, owned) = (&engine.body, engine.body.owned());
         let leading = |led: &Led| Led { particle: body.index(led.particle), ..*led };
@@ -208,7 +228,7 @@ impl<'a> EngineState<'a> {
         require("particles", self.present.len(), count)?;
         require("former places", self.previous.len(), count)?;
         require("roles", self.roles.len(), count)?;
-        require("particles that changes took", self.taken_by.len(), engine.taken_by.len())?;
+        require(TAKEN, self.taken_by.len(), engine.taken_by.len())?;
         let bits = engine.flock.bonds.as_ref().map(|_| engine.flock.neighbours.index.len().div_ceil(8));
         require("bytes of bonds", self.broken.as_ref().map_or(0, Vec::len), bits.unwrap_or(0))?;
         // A number from a file is an index only when it is below what it counts; one that is not says that there are more.
@@ -217,7 +237,7 @@ impl<'a> EngineState<'a> {
             if index < planned { Ok(()) } else { Err(WrongState { what, found, planned }) }
         };
         for led in &self.leaders {
-            require_below("role changes", led.change, engine.changes.len())?;
+            require_below(CHANGES, led.change, engine.changes.len())?;
             let change = &engine.changes[led.change];
             require("leaders without a motion", usize::from(change.motion.is_none()), 0)?;
             require_below("particles of a role change", led.which, change.particles.len())?;

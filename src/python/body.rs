@@ -17,7 +17,7 @@ use crate::continuum::equilibrium::{run_to_equilibrium_watched, solve_equilibriu
 use crate::continuum::mechanics::{Mechanics, Stresses};
 use crate::continuum::run::{Divergence, Outcome, StopReason, overflow};
 use crate::engine::Engine;
-use crate::engine::forces::Forces;
+use crate::engine::forces::{Forces, held};
 use crate::engine::observer::EachStep;
 use crate::flock::role::Role;
 use crate::scene::{Scene, SceneError};
@@ -70,10 +70,13 @@ impl Body {
             return Ok(());
         }
         let id = self.engine.body().id(particle);
+        let is_held = held(&self.engine).iter().flatten().any(|held| held.particle == particle);
+        let (what, help) = match is_held {
+            true => ("held along an axis alone".to_owned(), "leave `axis` out of its role in the scene"),
+            false => (format!("a {}", role.name()), "give it a role in the scene"),
+        };
         Err(PyValueError::new_err(format!(
-            "particle {particle} (id {id}) is a {}: only leaders and clamped particles are led; give it a role in \
-             the scene",
-            role.name()
+            "particle {particle} (id {id}) is {what}: only leaders and clamped particles are led; {help}"
         )))
     }
 

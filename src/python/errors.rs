@@ -25,6 +25,8 @@ create_exception!(
 
 impl From<scene::SceneError> for PyErr {
     fn from(error: scene::SceneError) -> Self {
+        // There is no command line: what lies over a file is a dict, or `set`.
+        let error = error.of_keys();
         let raised = SceneError::new_err(error.to_string());
         let outcome = Python::attach(|py| {
             let problems = error.problems().iter().map(|problem| described(py, problem));
@@ -38,7 +40,7 @@ impl From<scene::SceneError> for PyErr {
 fn described<'py>(py: Python<'py>, problem: &Problem) -> PyResult<Bound<'py, PyDict>> {
     let line = match problem.place {
         Place::Line { line, .. } => Some(line),
-        Place::File { .. } | Place::Override { .. } | Place::Varied { .. } => None,
+        Place::File { .. } | Place::Override { .. } | Place::Varied { .. } | Place::Key { .. } => None,
     };
     let description = PyDict::new(py);
     description.set_item("place", problem.place.to_string())?;

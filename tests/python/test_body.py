@@ -57,6 +57,13 @@ def test_a_body_seen_where_it_was_sent_goes_on_as_if_it_were_not(held_sheet):
     assert np.array_equal(body.positions()[20:22], seen)
 
 
+def test_a_particle_of_which_one_component_is_held_is_not_led(soft_bar):
+    left = {"region": {"kind": "edge", "side": "left"}, "role": "clamped"}
+    body = flockform.Body(soft_bar, set={"roles": [left | {"axis": axis} for axis in ("x", "y")]})
+    with pytest.raises(ValueError, match="held along an axis alone: .* leave `axis` out"):
+        body.lead(0, [0.0, 0.0])
+
+
 def test_a_solved_body_balances_its_load(soft_bar):
     body = flockform.Body(soft_bar)
     way = body.solve()

@@ -105,6 +105,15 @@ def test_a_scene_that_cannot_be_is_refused_with_file_line_key_and_remedy(tmp_pat
     assert problems["lattice.spacing"]["line"] == 2 and problems["lattice.spacing"]["found"] == "-1.0"
 
 
+def test_a_dict_that_cannot_be_is_refused_by_its_key():
+    scene = {"lattice": {"kind": "square", "spacing": -1.0}, "body": {"shape": {"kind": "disc", "radius": 3.0}}}
+    with pytest.raises(flockform.SceneError) as caught:
+        flockform.run(scene, set={"stop.steps": -5})
+    assert "--set" not in str(caught.value), caught.value
+    places = {problem["key"]: problem["place"] for problem in caught.value.problems}
+    assert places["lattice.spacing"] == "the key `lattice`" and places["stop.steps"] == "the key `stop.steps`"
+
+
 @pytest.mark.parametrize(
     ("call", "error", "words"),
     [

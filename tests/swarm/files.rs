@@ -264,11 +264,32 @@ fn rows_for_robots_of_other_entries_are_no_reason_for_caution() {
     let cautions = |robot: &str| {
         let (robots, _) = PAIR.split_once("[[leaders]]").expect("leaders last");
         let program = "program = { kind = \"file\", path = \"ways.csv\" }\n[limits]\nspeed = 1.0\n";
-        let text = format!("{robots}[[leaders]]\nrobots = [\"{robot}\"]\n{program}");
+        let other = if robot == "a" { "b" } else { "a" };
+        let external = format!("[[leaders]]\nrobots = [\"{other}\"]\nprogram = {{ kind = \"external\" }}\n");
+        let text = format!("{robots}{external}[[leaders]]\nrobots = [\"{robot}\"]\n{program}");
         plan_of(&Swarm::parse("t", "t.toml", &text, &[], Some(folder.path())).expect("valid"))
     };
     assert!(cautions("b").iter().any(|one| one.contains("up to 5.000 m/s")), "{:?}", cautions("b"));
     assert!(!cautions("a").iter().any(|one| one.contains("fall behind")), "{:?}", cautions("a"));
+}
+
+#[test]
+fn rows_for_robots_that_no_entry_leads_are_refused_by_their_line() {
+    let folder = temporary();
+    std::fs::write(folder.path().join("ways.csv"), "t,name,dx,dy\n0,a,0,0\n\n0,b,0,0\n").expect("written");
+    let (robots, _) = PAIR.split_once("[[leaders]]").expect("leaders last");
+    let text = format!(
+        "{robots}[[leaders]]\nrobots = [\"a\"]\nprogram = {{ kind = \"file\", path = \"ways.csv\" }}\n"
+    );
+    let refusal = |text: &str| {
+        let swarm = Swarm::parse("t", "t.toml", text, &[], Some(folder.path())).expect("valid");
+        Flight::new(&swarm).err().expect("refused").to_string()
+    };
+    let said = refusal(&text);
+    assert!(said.contains("\"ways.csv\": line 4: the file has rows for `b`, which no entry"), "{said}");
+    assert!(said.contains("help: let it lead"), "{said}");
+    let unknown = refusal(&text.replace("\"b\"", "\"d\""));
+    assert!(unknown.contains("line 4: the file has rows for `b`, and there is no such robot"), "{unknown}");
 }
 
 fn plan_of(swarm: &Swarm) -> Vec<String> {

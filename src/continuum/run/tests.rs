@@ -241,6 +241,33 @@ fn a_state_of_another_body_is_refused() {
 }
 
 #[test]
+fn a_state_with_a_role_added_by_hand_asks_for_it_and_goes_on_in_a_plan_that_has_it() {
+    use crate::engine::setup::RoleChange;
+    use crate::flock::condition::{Condition, Quantity};
+    use crate::flock::motion::{Interpolation, Keyframe, Motion};
+    use crate::flock::role::Role;
+    let scene = scene("tension", &[]);
+    for when in [None, Some(Condition { quantity: Quantity::X, above: Some(-100.0), below: None })] {
+        let mut engine = Engine::new(plan(&scene).setup);
+        let particle = engine.roles().iter().position(|&role| role == Role::Follower).expect("a follower");
+        let frames = vec![Keyframe { step: 9.0, displacement: [1.0, 0.0] }];
+        let motion = Some(Motion::Keyframes { frames, interpolation: Interpolation::Linear });
+        let added = RoleChange { when, motion, ..RoleChange::new(vec![particle], Role::Leader, 2) };
+        engine.add_role_change(added.clone());
+        (0..4).for_each(|_| engine.advance());
+        let error = through_bytes(&engine).engine(plan(&scene).setup).expect_err("it lacks the change");
+        assert!(error.to_string().contains("added by hand"), "{error}");
+        let mut setup = plan(&scene).setup;
+        setup.changes.push(added);
+        let mut again = through_bytes(&engine).engine(setup).expect("it has the change");
+        for engine in [&mut engine, &mut again] {
+            (0..9).for_each(|_| engine.advance());
+        }
+        assert_eq!(EngineState::of(&again), EngineState::of(&engine));
+    }
+}
+
+#[test]
 fn the_digest_distinguishes_plans_by_what_a_run_depends_on() {
     let of = |sets: &[&str]| digest(&plan(&scene("tension", sets)));
     let plain = of(&[]);

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use super::overrides::split_assignment;
+
 /// Problems kept in one report; a reader mends a handful at a time.
 const KEPT_PROBLEMS: usize = 20;
 
@@ -30,6 +32,11 @@ pub enum Place {
         /// The key and the value, as an override has them.
         text: String,
     },
+    /// A key of a dict, as Python gives them.
+    Key {
+        /// The key or its path.
+        key: String,
+    },
 }
 
 impl fmt::Display for Place {
@@ -39,6 +46,7 @@ impl fmt::Display for Place {
             Place::File { file } => f.write_str(file),
             Place::Override { text } => write!(f, "--set {text}"),
             Place::Varied { text } => write!(f, "--vary {text}"),
+            Place::Key { key } => write!(f, "the key `{key}`"),
         }
     }
 }
@@ -115,6 +123,17 @@ impl SceneError {
         self
     }
 
+    /// The same where the overrides are keys of a dict.
+    pub fn of_keys(mut self) -> Self {
+        for Problem { place, .. } in &mut self.problems {
+            if let Place::Override { text } = place {
+                let key = split_assignment(text).map_or(text.as_str(), |(key, _)| key).to_owned();
+                *place = Place::Key { key };
+            }
+        }
+        self
+    }
+
     /// The problems that were kept.
     pub fn problems(&self) -> &[Problem] {
         &self.problems
@@ -133,7 +152,7 @@ impl SceneError {
         self.problems.sort_by_key(|problem| match problem.place {
             Place::File { .. } => 0,
             Place::Line { line, .. } => line,
-            Place::Override { .. } | Place::Varied { .. } => usize::MAX,
+            Place::Override { .. } | Place::Varied { .. } | Place::Key { .. } => usize::MAX,
         });
         Err(self)
     }
@@ -195,6 +214,21 @@ mod tests {
         let sorted = error.into_result(()).unwrap_err();
         let places: Vec<String> = sorted.problems().iter().map(|p| p.place.to_string()).collect();
         assert_eq!(places, ["beam.toml:3", "beam.toml:7", "--set n=1"]);
+    }
+
+    #[test]
+    fn a_key_of_a_dict_is_named_as_one() {
+        let mut error = SceneError::default();
+        for text in ["lattice={\"spacing\"=-2.0}", "\"a=b\".c=1", "none", "n=1"] {
+            error.push(Problem { place: Place::Override { text: text.into() }, ..problem_at(0) });
+        }
+        error.push(problem_at(3));
+        let said = error.of_keys();
+        let places: Vec<String> = said.problems().iter().map(|p| p.place.to_string()).collect();
+        assert_eq!(
+            places,
+            ["the key `lattice`", "the key `\"a=b\".c`", "the key `none`", "the key `n`", "beam.toml:3"]
+        );
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::raw::*;
-use super::{Leaders, Picked, Program, Shape};
+use super::{Leaders, Picked, Program, Shape, Track};
 use crate::flock::motion::{Interpolation, Keyframe, Motion};
 use crate::scene::document::problem::SceneError;
 use crate::scene::rows::Rows;
@@ -114,16 +114,16 @@ fn track(text: &str, scale: f64) -> Result<Program, String> {
         ["t", "name", "dx", "dy"] => (Some(1), [2, 3]),
         _ => return Err(format!("line 1: the header is `{}`", rows.header_line())),
     };
-    let mut tracks: Vec<(String, Vec<Keyframe>)> = Vec::new();
+    let mut tracks: Vec<(String, u64, Vec<Keyframe>)> = Vec::new();
     rows.each(|row| {
         let displacement = [row.number(dx, scale)?, row.number(dy, scale)?];
         let frame = Keyframe { step: row.number(0, 1.0)?, displacement };
         let name = name.map_or("", |name| row.text(name));
-        let place = tracks.iter().position(|(known, _)| known == name).unwrap_or_else(|| {
-            tracks.push((name.to_owned(), Vec::new()));
+        let place = tracks.iter().position(|(known, ..)| known == name).unwrap_or_else(|| {
+            tracks.push((name.to_owned(), row.line, Vec::new()));
             tracks.len() - 1
         });
-        let frames = &mut tracks[place].1;
+        let frames = &mut tracks[place].2;
         let fault = match frames.last() {
             _ if frame.step < 0.0 => Some("is negative: a program begins at t = 0"),
             Some(before) if before.step >= frame.step => Some("is not later than the row before it"),
@@ -137,13 +137,12 @@ fn track(text: &str, scale: f64) -> Result<Program, String> {
     })?;
     let motion = |frames| Motion::Keyframes { frames, interpolation: Interpolation::Linear };
     if name.is_some() {
-        return Ok(Program::Individual(
-            tracks.into_iter().map(|(name, frames)| (name, motion(frames))).collect(),
-        ));
+        let track = |(name, line, frames)| Track { name, line, motion: motion(frames) };
+        return Ok(Program::Individual(tracks.into_iter().map(track).collect()));
     }
     tracks
         .pop()
-        .map(|(_, frames)| Program::Motion(motion(frames)))
+        .map(|(.., frames)| Program::Motion(motion(frames)))
         .ok_or_else(|| "the file has no rows".into())
 }
 
@@ -155,7 +154,7 @@ mod tests {
     fn a_track_moves_all_alike_or_each_by_name() {
         let at = |program: &Program, t: f64| match program {
             Program::Motion(motion) => motion.displacement(t, 0, [0.0; 2]),
-            Program::Individual(tracks) => tracks[1].1.displacement(t, 0, [0.0; 2]),
+            Program::Individual(tracks) => tracks[1].motion.displacement(t, 0, [0.0; 2]),
             _ => unreachable!("a track is a motion"),
         };
         let alike = track("t,dx,dy\n0,0,0\n2,1,-1\n", 2.0).expect("reads");

@@ -95,9 +95,20 @@ pub enum Program {
     /// All alike.
     Motion(Motion),
     /// Each by its own.
-    Individual(Vec<(String, Motion)>),
+    Individual(Vec<Track>),
     /// By number among the swarm's manoeuvres.
     Manoeuvre(usize),
+}
+
+/// The motion of one leader, from a file.
+#[derive(Clone, Debug)]
+pub struct Track {
+    /// The leader.
+    pub name: String,
+    /// The line of its first row, counted from 1.
+    pub line: u64,
+    /// Its displacements; times in seconds.
+    pub motion: Motion,
 }
 
 impl Swarm {

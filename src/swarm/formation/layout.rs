@@ -15,7 +15,7 @@ use crate::flock::vectors::{Vectors, distance};
 use crate::material::cells::Cells;
 use crate::scene::raw::{RawRest, RawWeights};
 use crate::scene::swarm::raw::RawLinks;
-use crate::scene::swarm::{Picked, Program, Recording, Shape, Swarm};
+use crate::scene::swarm::{Picked, Program, Recording, Shape, Swarm, Track};
 use crate::scene::{RoleEntry, Scene, SceneError, SceneRegion};
 use crate::solve::affine_weights;
 use crate::sweep::Update;
@@ -220,18 +220,31 @@ fn leads(
                 wanted.iter().enumerate().map(number).collect::<Result<_, _>>()?
             }
         };
-        if let Program::Individual(tracks) = &entry.program
-            && let Some((name, _)) = tracks.iter().find(|(name, _)| !names.contains(name))
-        {
-            let message = format!("the file has rows for `{name}`, and there is no such robot");
-            let help = "name robots of this swarm";
-            return Err(swarm.refuse(&format!("leaders[{k}].program.path"), message, help));
-        }
         for m in members {
             leads[m] = Some((k, lead(swarm, k, &entry.program, &names[m], m, places)?));
         }
     }
+    require_led(swarm, names, &leads)?;
     Ok(leads)
+}
+
+/// Refuses files with rows of robots that no entry leads; one file may serve several entries.
+fn require_led<L>(swarm: &Swarm, names: &[String], leads: &[Option<L>]) -> Result<(), SceneError> {
+    for (k, entry) in swarm.leaders.iter().enumerate() {
+        let Program::Individual(tracks) = &entry.program else { continue };
+        for Track { name, line, .. } in tracks {
+            let (fault, help) = match names.iter().position(|known| known == name) {
+                None => ("and there is no such robot", "name robots of this swarm"),
+                Some(m) if leads[m].is_none() => {
+                    ("which no entry of `leaders` leads", "let it lead, or leave its rows out")
+                }
+                Some(_) => continue,
+            };
+            let message = format!("line {line}: the file has rows for `{name}`, {fault}");
+            return Err(swarm.refuse(&format!("leaders[{k}].program.path"), message, help));
+        }
+    }
+    Ok(())
 }
 
 fn lead(
@@ -246,12 +259,12 @@ fn lead(
         Program::External => Lead::External(places.get(member)),
         Program::Motion(motion) => Lead::Motion { motion: motion.clone(), since: 0.0 },
         Program::Individual(tracks) => {
-            let track = tracks.iter().find(|(known, _)| known == name).ok_or_else(|| {
+            let track = tracks.iter().find(|track| track.name == name).ok_or_else(|| {
                 let key = format!("leaders[{entry}].program.path");
                 let message = format!("the file has no rows for `{name}`");
                 swarm.refuse(&key, message, "give every leader rows of its own")
             })?;
-            Lead::Motion { motion: track.1.clone(), since: 0.0 }
+            Lead::Motion { motion: track.motion.clone(), since: 0.0 }
         }
         Program::Manoeuvre(number) => {
             let named = &swarm.manoeuvres[*number];

@@ -35,8 +35,9 @@ pub enum RawProgram {
         #[serde(default)]
         interpolation: RawInterpolation,
     },
-    /// By a CSV file with the columns `t,dx,dy` (all alike) or `t,name,dx,dy`: seconds, and metres from
-    /// the place in the formation. Straight between the rows; the last is held.
+    /// By a CSV file with the columns `t,dx,dy` (all alike) or `t,name,dx,dy` (each by its own rows; one
+    /// file may serve several entries): seconds, and metres from the place in the formation. Straight between the rows; the last
+    /// is held.
     File {
         /// Path, relative to the swarm file.
         path: String,
