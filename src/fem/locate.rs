@@ -1,48 +1,40 @@
-//! Which cell holds a point, and where in it: the boxes of cells, then a bounded Newton's method on the isoparametric map.
+//! Which cell holds a point, and where in it: boxes, then a bounded Newton's method on the isoparametric map.
 
 use super::element::{CENTRE, Shape, clamped, contains};
 use super::mesh::Mesh;
 use crate::geometry::box_tree::BoxTree;
-use crate::geometry::point::{bounds, distance};
+use crate::geometry::point::{Point, bounds, distance};
 
 /// Newton steps at most; a point of the cell is reached in fewer than ten.
 const STEPS: usize = 20;
 /// How far outside the reference cell a point may be found and still count as in it [-].
 const SLACK: f64 = 1e-8;
 
-/// A search structure over the cells of one mesh.
-pub(crate) struct Locator<'m> {
-    mesh: &'m Mesh,
-    boxes: BoxTree,
-}
-
-impl<'m> Locator<'m> {
-    pub fn new(mesh: &'m Mesh) -> Locator<'m> {
-        let of_cell = |cell: usize| {
-            let (low, high) = bounds(mesh.positions(cell));
-            // A curved side may bulge beyond its nodes by less than an eighth of the cell.
-            let margin = (0.125 + 4.0 * SLACK) * (high[0] - low[0]).max(high[1] - low[1]);
-            (low.map(|v| v - margin), high.map(|v| v + margin))
-        };
-        Locator { mesh, boxes: BoxTree::new((0..mesh.cell_count()).map(of_cell)) }
-    }
-
-    /// The cells that hold `p` \[m\], or are no further than `reach` \[m\] from it, with reference coordinates that continue them to
-    /// it: the nearest first, of those equally near the lowest-numbered one.
-    pub fn near(&self, p: [f64; 2], reach: f64) -> Vec<(usize, [f64; 2])> {
-        let near = self.boxes.overlapping(p.map(|v| v - reach), p.map(|v| v + reach)).filter_map(|cell| {
-            let place = invert(self.mesh, cell, p)?;
-            if contains(place, SLACK) {
-                return Some((0.0, cell, place));
+/// The cells that hold each point, or are no further than `reach` \[m\] from it, with reference coordinates that continue them to it:
+/// the nearest first, of those equally near the lowest-numbered one.
+pub(crate) fn cells_near(mesh: &Mesh, points: &[Point], reach: f64) -> Vec<Vec<(usize, Point)>> {
+    // A mesh has far more cells than there are points asked for: it is these that are put in order.
+    let boxes = BoxTree::new(points.iter().map(|p| (p.map(|v| v - reach), p.map(|v| v + reach))));
+    let mut near: Vec<Vec<(f64, usize, Point)>> = vec![Vec::new(); points.len()];
+    for cell in 0..mesh.cell_count() {
+        let (low, high) = bounds(mesh.positions(cell));
+        // A curved side may bulge beyond its nodes by less than an eighth of the cell.
+        let margin = (0.125 + 4.0 * SLACK) * (high[0] - low[0]).max(high[1] - low[1]);
+        for point in boxes.overlapping(low.map(|v| v - margin), high.map(|v| v + margin)) {
+            let Some(place) = invert(mesh, cell, points[point]) else { continue };
+            let within = || Shape::at(clamped(place)).interpolate(&mesh.positions(cell));
+            let holds = contains(place, SLACK);
+            let apart = if holds { 0.0 } else { distance(points[point], within()) };
+            if holds || (reach > 0.0 && apart <= reach) {
+                near[point].push((apart, cell, place));
             }
-            let within = Shape::at(clamped(place)).interpolate(&self.mesh.positions(cell));
-            let apart = distance(p, within);
-            (reach > 0.0 && apart <= reach).then_some((apart, cell, place))
-        });
-        let mut near: Vec<_> = near.collect();
+        }
+    }
+    let in_order = |mut near: Vec<(f64, usize, Point)>| {
         near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         near.into_iter().map(|(_, cell, place)| (cell, place)).collect()
-    }
+    };
+    near.into_iter().map(in_order).collect()
 }
 
 /// Reference coordinates of a point \[m\] in a cell, which need not hold it; `None` if there are none nearby.
@@ -76,16 +68,21 @@ mod tests {
             [r * t.cos(), r * t.sin()]
         });
         let mesh = ring.unwrap();
-        let locator = Locator::new(&mesh);
-        for k in 1..400 {
-            let (r, t) = (1.02 + 0.94 * (k as f64 * 0.618).fract(), 0.01 + 1.18 * (k as f64 * 0.414).fract());
-            let p = [r * t.cos(), r * t.sin()];
-            let (cell, place) = locator.near(p, 0.0).first().copied().unwrap_or_else(|| panic!("{p:?}"));
+        let inside = |k: i32| {
+            let k = f64::from(k);
+            let (r, t) = (1.02 + 0.94 * (k * 0.618).fract(), 0.01 + 1.18 * (k * 0.414).fract());
+            [r * t.cos(), r * t.sin()]
+        };
+        let points: Vec<Point> = (1..400).map(inside).collect();
+        for (p, near) in points.iter().zip(cells_near(&mesh, &points, 0.0)) {
+            let &(cell, place) = near.first().unwrap_or_else(|| panic!("{p:?}"));
             let q = Shape::at(place).interpolate(&mesh.positions(cell));
             assert!((p[0] - q[0]).hypot(p[1] - q[1]) < 1e-12, "{p:?} {q:?}");
         }
-        for p in [[0.0, 0.0], [0.9, 0.1], [5.0, 5.0], [-1.0, 0.5], [f64::NAN, 0.0], [f64::INFINITY, 1.0]] {
-            assert!(locator.near(p, 0.0).is_empty(), "{p:?}");
+        let outside =
+            [[0.0, 0.0], [0.9, 0.1], [5.0, 5.0], [-1.0, 0.5], [f64::NAN, 0.0], [f64::INFINITY, 1.0]];
+        for (p, near) in outside.iter().zip(cells_near(&mesh, &outside, 0.0)) {
+            assert!(near.is_empty(), "{p:?}");
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::element::{Gradient, Pairs, REFERENCE_NODES, Rule, Shape};
 use super::error::FemError;
-use super::locate::Locator;
+use super::locate::cells_near;
 use super::material::{Inclusions, Material, Stress};
 use super::mesh::Mesh;
 use super::problem::Problem;
@@ -110,18 +110,21 @@ impl Solution {
         [near, reach]: [f64; 2],
         value: impl Fn(&[(usize, Shape)]) -> T,
     ) -> Result<Vec<T>, FemError> {
-        let locator = Locator::new(&self.mesh);
-        let at = |(index, &[x, y]): (usize, &Point)| {
-            let mut cells = locator.near([x, y], near);
-            if cells.is_empty() && reach > near {
-                cells = locator.near([x, y], reach);
-                cells.truncate(1);
+        let mut cells = cells_near(&self.mesh, points, near);
+        let outside: Vec<usize> = (0..points.len()).filter(|&k| cells[k].is_empty()).collect();
+        if !outside.is_empty() && reach > near {
+            let places: Vec<Point> = outside.iter().map(|&k| points[k]).collect();
+            for (k, mut found) in outside.into_iter().zip(cells_near(&self.mesh, &places, reach)) {
+                found.truncate(1);
+                cells[k] = found;
             }
-            let cells = cells.into_iter().map(|(cell, place)| (cell, Shape::at(place)));
-            let cells: Vec<(usize, Shape)> = cells.collect();
+        }
+        let at = |(index, cells): (usize, Vec<(usize, Point)>)| {
+            let [x, y] = points[index];
+            let cells: Vec<_> = cells.into_iter().map(|(cell, place)| (cell, Shape::at(place))).collect();
             if cells.is_empty() { Err(FemError::OutsideMesh { index, x, y }) } else { Ok(value(&cells)) }
         };
-        points.iter().enumerate().map(at).collect()
+        cells.into_iter().enumerate().map(at).collect()
     }
 
     /// Stress at a node of a cell by that cell alone; `local` is the node's number in the cell.
