@@ -149,11 +149,11 @@ impl Element {
 
     /// The force of the cell on the corner `own` \[force, world frame\], and its rotation; `None` as [`Element::turn`].
     pub fn force_on(&self, own: usize, corner: impl Fn(usize) -> Corner) -> Option<(Turn, [f64; 2])> {
-        let turn = self.turn(&corner)?;
+        let (turn, y, z) = self.places(corner)?;
         let (mut moment, mut force) = (0.0, [0.0; 2]);
-        for j in 0..self.corners() {
-            let pull = self.pull(j, turn, &corner);
-            moment += cross(place(turn, corner(j)), pull);
+        for (j, &z) in z.iter().enumerate() {
+            let pull = self.stiffness_times(j, &y);
+            moment += cross(z, pull);
             if j == own {
                 force = pull;
             }
@@ -167,10 +167,25 @@ impl Element {
         [moment * by_angle[0] - pull[0], moment * by_angle[1] - pull[1]]
     }
 
-    /// `(K y)_j`.
-    fn pull(&self, j: usize, turn: Turn, corner: impl Fn(usize) -> Corner) -> [f64; 2] {
-        (0..self.corners()).fold([0.0; 2], |sum, k| {
-            let [x, y] = apply(self.block(j, k), turn.strained(corner(k)));
+    /// The rotation of the cell, and `y = R' x - X` and `z = R' x` of its corners.
+    #[allow(clippy::type_complexity)]
+    fn places(&self, corner: impl Fn(usize) -> Corner) -> Option<(Turn, Vec<[f64; 2]>, Vec<[f64; 2]>)> {
+        let corners: Vec<Corner> = (0..self.corners()).map(corner).collect();
+        let turn = self.turn(|k| corners[k])?;
+        let y: Vec<[f64; 2]> = corners.iter().map(|&corner| turn.strained(corner)).collect();
+        let z = corners
+            .iter()
+            .zip(&y)
+            .map(|(corner, y)| [y[0] + corner.reference[0], y[1] + corner.reference[1]]);
+        let z = z.collect();
+        Some((turn, y, z))
+    }
+
+    /// `(K v)_j`.
+    fn stiffness_times(&self, j: usize, v: &[[f64; 2]]) -> [f64; 2] {
+        let row = &self.stiffness[j * self.corners()..][..self.corners()];
+        row.iter().zip(v).fold([0.0; 2], |sum, (block, &v)| {
+            let [x, y] = apply(block, v);
             [sum[0] + x, sum[1] + y]
         })
     }
@@ -180,21 +195,14 @@ impl Element {
     /// With `z = R' x`, `l = K y`, `w = S g / q`, `a = K S z`, `b = S l - a + (M / q) g` and `c = (S z) . a - z . l`, all in the
     /// axes of the cell, the second derivatives are `K_ik + b_i w_k' + w_i b_k' + c w_i w_k'`: symmetric as `K` is.
     pub fn row(&self, own: usize, corner: impl Fn(usize) -> Corner) -> Option<CellRow> {
-        let turn = self.turn(&corner)?;
+        let (turn, y, z) = self.places(corner)?;
         let count = self.corners();
-        let z: Vec<[f64; 2]> = (0..count).map(|k| place(turn, corner(k))).collect();
-        let l: Vec<[f64; 2]> = (0..count).map(|k| self.pull(k, turn, &corner)).collect();
-        let a: Vec<[f64; 2]> = (0..count)
-            .map(|j| {
-                (0..count).fold([0.0; 2], |sum, k| {
-                    let [x, y] = apply(self.block(j, k), quarter(z[k]));
-                    [sum[0] + x, sum[1] + y]
-                })
-            })
-            .collect();
+        let turned: Vec<[f64; 2]> = z.iter().map(|&z| quarter(z)).collect();
+        let l: Vec<[f64; 2]> = (0..count).map(|j| self.stiffness_times(j, &y)).collect();
+        let a: Vec<[f64; 2]> = (0..count).map(|j| self.stiffness_times(j, &turned)).collect();
         let sum = |term: &dyn Fn(usize) -> f64| (0..count).map(term).sum::<f64>();
         let moment = sum(&|k| cross(z[k], l[k])) / turn.trace;
-        let c = sum(&|k| dot(quarter(z[k]), a[k]) - dot(z[k], l[k]));
+        let c = sum(&|k| dot(turned[k], a[k]) - dot(z[k], l[k]));
         let w = |k: usize| quarter(self.gradients[k]).map(|g| g / turn.trace);
         let b = |k: usize| {
             let turned = quarter(l[k]);
@@ -209,7 +217,7 @@ impl Element {
             turn.turned(&[[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]])
         });
         let force = turn.forth(self.balanced(own, l[own], moment));
-        let energy = 0.5 * sum(&|k| dot(turn.strained(corner(k)), l[k]));
+        let energy = 0.5 * sum(&|k| dot(y[k], l[k]));
         Some(CellRow { turn, force, energy, tangent: tangent.collect() })
     }
 }
@@ -269,12 +277,6 @@ pub fn target(own: &ParticleState, (force, hold): ([f64; 2], Block), held: [bool
         false => own.present[axis] + force[axis] / hold[axis][axis],
     };
     Some([component(0), component(1)])
-}
-
-/// `R' (X + u)`.
-fn place(turn: Turn, corner: Corner) -> [f64; 2] {
-    let strained = turn.strained(corner);
-    [strained[0] + corner.reference[0], strained[1] + corner.reference[1]]
 }
 
 pub(super) fn quarter([x, y]: [f64; 2]) -> [f64; 2] {

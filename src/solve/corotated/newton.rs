@@ -102,6 +102,10 @@ impl<'a> Newton<'a> {
         let mut led: Vectors = u.iter().zip(now.iter()).map(|(here, there)| minus(there, here)).collect();
         let Some((mut locals, mut left)) = rule.forces(&u, after) else { return Ok(None) };
         let turns: Vec<Option<Turn>> = locals.iter().map(|l| l.as_ref().map(|l| l.turn)).collect();
+        let near = |(a, b): (&Option<Turn>, &Option<Local>)| match (a, b) {
+            (Some(a), Some(b)) => a.cosine_to(b.turn) >= LEAST_COSINE,
+            _ => true,
+        };
         let (mut best, mut stalled) = (f64::INFINITY, 0);
         let (mut is_settled, mut is_rounding) = (false, false);
         let before = (goal < ON_THE_WAY).then(|| (rule.outer(from), rule.whole.norm(&from.displacement)));
@@ -119,6 +123,10 @@ impl<'a> Newton<'a> {
             rule.hold(&mut u, &now);
             let Some(found) = rule.forces(&u, after) else { return Ok(None) };
             (locals, left) = found;
+            // A step already turns cells about as far as they will be: the rest of them would be for nothing.
+            if rule.whole.any(!turns.iter().zip(&locals).all(near)) {
+                return Ok(None);
+            }
             let residual = rule.whole.norm(&left) / self.size;
             self.residuals.push(residual);
             let rounding = rule.rounding(&locals, &u, after) / self.size;
@@ -144,16 +152,11 @@ impl<'a> Newton<'a> {
                 return Ok(None);
             }
         }
-        let near = |(a, b): (&Option<Turn>, &Option<Local>)| match (a, b) {
-            (Some(a), Some(b)) => a.cosine_to(b.turn) >= LEAST_COSINE,
-            _ => true,
-        };
-        let is_far = rule.whole.any(!turns.iter().zip(&locals).all(near));
         // An iteration sees of a system what its right-hand side has in it, which is all where that is rounding; a factorisation sees
         // all, and a sweep nothing.
         let sees = rule.question.solver == rule.step.solver;
         let is_seen = sees && self.last_step <= NEAR && (is_rounding || rule.step.solver == DIRECT);
-        let is_taken = is_settled && !is_far && (is_seen || self.is_stable(&locals)?);
+        let is_taken = is_settled && (is_seen || self.is_stable(&locals)?);
         let found = if is_taken { rule.stored(u, after) } else { None };
         Ok(found.filter(|found| rule.keeps_energy(from, found)))
     }
