@@ -160,6 +160,19 @@ impl Operator {
         rows: Vec<Row>,
         follows: Vec<bool>,
     ) -> Result<Self, OperatorError> {
+        let names: Vec<Name> = rows.iter().map(|row| name_of(content(row))).collect();
+        join_alike(&names, &mut class);
+        Self::of_names((sites, outliers), grid, class, (rows, names), follows)
+    }
+
+    /// The same of rows of which no two have one name.
+    fn of_names(
+        (sites, outliers): (&[Site], Outliers),
+        grid: [[f64; 2]; 2],
+        class: Vec<u32>,
+        (rows, names): (Vec<Row>, Vec<Name>),
+        follows: Vec<bool>,
+    ) -> Result<Self, OperatorError> {
         let (count, classes) = (sites.len(), class.len());
         if classes != count || follows.len() != count {
             return Err(OperatorError::Shapes { sites: count, classes, follows: follows.len() });
@@ -175,8 +188,6 @@ impl Operator {
         let columns = Columns::new(sites.iter().copied(), &outliers, |_| true);
         let diagonals = rows.iter().flat_map(|row| row.diagonal.as_flattened().iter().copied());
         let stiffness = power_of_two(diagonals);
-        let names: Vec<Name> = rows.iter().map(|row| name_of(content(row))).collect();
-        join_alike(&names, &mut class);
         let rows =
             Arc::new(Rows::from(rows.into_iter().map(|row| row.divided_by(stiffness)).collect::<Vec<_>>()));
         let held_axes = Vec::new();
@@ -202,22 +213,19 @@ impl Operator {
         follows: Vec<bool>,
         row: impl Fn(usize) -> Row,
     ) -> Result<Self, OperatorError> {
-        let mut known: HashMap<Vec<u64>, u32> = HashMap::new();
-        let mut rows: Vec<Row> = Vec::new();
+        let mut known: HashMap<Name, u32> = HashMap::new();
+        let (mut rows, mut names) = (Vec::new(), Vec::new());
         let mut class = vec![0; sites.len()];
         for i in (0..sites.len().min(follows.len())).filter(|&i| follows[i]) {
             let row = row(i);
-            let is_alike = |class: u32| content(&rows[class as usize]).eq(content(&row));
-            // Most particles are like the one before.
-            class[i] = match i.checked_sub(1).filter(|&before| follows[before]) {
-                Some(before) if is_alike(class[before]) => class[before],
-                _ => *known.entry(content(&row).collect()).or_insert_with(|| {
-                    rows.push(row);
-                    rows.len() as u32 - 1
-                }),
-            };
+            let name = name_of(content(&row));
+            class[i] = *known.entry(name).or_insert_with(|| {
+                rows.push(row);
+                names.push(name);
+                rows.len() as u32 - 1
+            });
         }
-        Self::along_outline((sites, outliers), grid, class, rows, follows)
+        Self::of_names((sites, outliers), grid, class, (rows, names), follows)
     }
 
     /// The same with single components held of followers, shape \[count\]\[x, y\]; their rows for these components are
