@@ -56,7 +56,7 @@ fn errors(kind: LatticeKind, a: f64) -> [f64; 2] {
 
 #[test]
 fn a_cantilever_bends_like_the_elastica_on_every_lattice() {
-    let cases: Vec<_> = (0..KINDS.len()).flat_map(|kind| [1.0, 5.0, 10.0].map(|a| (kind, a))).collect();
+    let cases: Vec<_> = (0..KINDS.len()).flat_map(|kind| [1.0, 10.0].map(|a| (kind, a))).collect();
     // Each takes one thread for seconds.
     let errors: Vec<_> = cases.par_iter().map(|&(kind, a)| errors(KINDS[kind](1.0 / 16.0), a)).collect();
     for ((kind, a), [w, u]) in cases.into_iter().zip(errors) {
