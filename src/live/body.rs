@@ -195,19 +195,18 @@ impl Session for Body {
         // A hand is not to wait for the next step, least of all where the body stands still.
         for (i, by) in self.history.now.ahead() {
             let (now, then) = (present.get(i), reference.get(i));
-            (0..2).for_each(|axis| places[axis][i] = (now[axis] + by[axis] - then[axis]) as f32);
+            (0..2).for_each(|axis| places[axis][i] = now[axis] + by[axis] - then[axis]);
         }
-        let of = |name: &str| -> Vec<f32> {
+        let of = |name: &str| -> Vec<f64> {
             if name == "von_mises" {
-                let stresses = Stresses::von_mises_of_cells(engine).into_iter();
-                return stresses.map(|stress| stress as f32).collect();
+                return Stresses::von_mises_of_cells(engine);
             }
             let value = |i: usize| match name {
                 "pe2" => engine.pe2(i),
                 "pe1" => engine.pe1(i),
                 _ => engine.strain(i).map_or(f64::NAN, |strain| strain.largest()),
             };
-            (0..present.len()).map(|i| value(i) as f32).collect()
+            (0..present.len()).map(value).collect()
         };
         let channels = self.channels().into_iter().zip(wanted);
         let channels = channels.map(|(name, wanted)| wanted.then(|| of(name))).collect();

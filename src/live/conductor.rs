@@ -372,11 +372,12 @@ const ROLES: u32 = 2;
 const BROKEN: u32 = 3;
 
 /// A frame: kind, count, the channels that follow as bits, nothing; the clock, when it was sent \[ms since 1970\], times
-/// of a step and of a frame \[ms\] as doubles; then every quantity.
+/// of a step and of a frame \[ms\] as doubles; then of every quantity its unit as a double, and its values in that as single
+/// floats. A unit is a power of two, which keeps the digits, of the size of the largest value: floats go no further than 1e38.
 fn encoded(frame: &Frame, step_time: f64, frame_time: f64) -> Bytes {
     let Frame { clock, places: [dx, dy], channels } = frame;
-    let mut bytes = Vec::with_capacity(48 + 4 * dx.len() * (2 + channels.len()));
-    let bit = |(k, channel): (usize, &Option<Vec<f32>>)| u32::from(channel.is_some()) << k;
+    let mut bytes = Vec::with_capacity(48 + (8 + 4 * dx.len()) * (2 + channels.len()));
+    let bit = |(k, channel): (usize, &Option<Vec<f64>>)| u32::from(channel.is_some()) << k;
     let present: u32 = channels.iter().enumerate().map(bit).sum();
     for word in [FRAME, dx.len() as u32, present, 0] {
         bytes.extend(word.to_le_bytes());
@@ -386,7 +387,11 @@ fn encoded(frame: &Frame, step_time: f64, frame_time: f64) -> Bytes {
         bytes.extend(value.to_le_bytes());
     }
     for values in [dx, dy].into_iter().chain(channels.iter().flatten()) {
-        values.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+        let sizes = values.iter().map(|value| value.abs()).filter(|size| size.is_finite());
+        let largest = sizes.fold(0.0, f64::max);
+        let unit = if largest > 0.0 { largest.log2().floor().exp2() } else { 1.0 };
+        bytes.extend(unit.to_le_bytes());
+        values.iter().for_each(|value| bytes.extend(((value / unit) as f32).to_le_bytes()));
     }
     bytes.into()
 }

@@ -3,7 +3,8 @@
 export class LiveFrames {
   constructor(channels, count) {
     Object.assign(this, { channels, ready: 1 });
-    this.values = new Map([["dx", new Float32Array(count)], ["dy", new Float32Array(count)]]);
+    this.count = count;
+    this.values = new Map(["dx", "dy"].map((name) => [name, { unit: 1, parts: new Float32Array(count) }]));
   }
 
   has(name) {
@@ -11,19 +12,21 @@ export class LiveFrames {
   }
 
   read(name, frame, out) {
-    const values = this.values.get(name);
-    if (values) out.set(values);
-    else out.fill(NaN);
+    const { unit, parts } = this.values.get(name) ?? { unit: NaN, parts: out };
+    for (let i = 0; i < out.length; i++) out[i] = unit * parts[i];
   }
 
   // Takes up a message; null if it has another count than the page.
   take(buffer) {
     const view = new DataView(buffer);
     const [count, present] = [view.getUint32(4, true), view.getUint32(8, true)];
-    if (count !== this.values.get("dx").length) return null;
+    if (count !== this.count) return null;
     const [clock, sent, stepTime, frameTime] = [16, 24, 32, 40].map((at) => view.getFloat64(at, true));
     const names = ["dx", "dy", ...this.channels.filter((_, k) => (present >> k) & 1)];
-    names.forEach((name, k) => this.values.set(name, new Float32Array(buffer, 48 + 4 * k * count, count)));
+    names.forEach((name, k) => {
+      const at = 48 + (8 + 4 * count) * k;
+      this.values.set(name, { unit: view.getFloat64(at, true), parts: new Float32Array(buffer, at + 8, count) });
+    });
     return { clock, sent, stepTime, frameTime };
   }
 }
