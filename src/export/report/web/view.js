@@ -4,7 +4,7 @@ import { Painter } from "./painter.js";
 import { PlainPainter } from "./painter2d.js";
 import { marksOf } from "./marks.js";
 import { multiples, placeWords, themeColour, themeText, ticks, words } from "./colour.js";
-import { shown } from "./shown.js";
+import { made, shown } from "./shown.js";
 
 // Ways of more particles would cover each other.
 const MOST_WAYS = 400;
@@ -31,18 +31,12 @@ export class View {
     this.unit = spacing > 0 ? 2 ** Math.floor(Math.log2(spacing)) : 1;
     this.marked = -1;
     this.kept = -1;
-    const figure = document.createElement("figure");
-    figure.className = "view";
-    if (body.animation.name) figure.append(Object.assign(document.createElement("figcaption"), { textContent: body.animation.name }));
-    this.box = document.createElement("div");
-    this.box.className = "canvas";
-    this.box.tabIndex = 0;
-    this.box.setAttribute("role", "application");
-    this.box.setAttribute("aria-label", `${body.animation.name || "Body"}: ${body.count} ${body.animation.noun}s. Plus and minus zoom, shift with arrows moves.`);
-    [this.under, this.middle, this.over] = [0, 1, 2].map(() => document.createElement("canvas"));
-    this.box.append(this.under, this.middle, this.over);
-    figure.append(this.box);
-    parent.append(figure);
+    const { name, noun } = body.animation;
+    const label = `${name || "Body"}: ${body.count} ${noun}s. Plus and minus zoom, shift with arrows moves.`;
+    [this.under, this.middle, this.over] = [0, 1, 2].map(() => made("canvas"));
+    this.box = made("div", { class: "canvas", tabindex: 0, role: "application", "aria-label": label }, this.under, this.middle, this.over);
+    const caption = name ? [made("figcaption", {}, name)] : [];
+    parent.append(made("figure", { class: "view" }, ...caption, this.box));
     // Where neither is asked for, the one that is faster here.
     const wanted = new URLSearchParams(location.search).get("painter");
     this.painter = (wanted !== "2d" && Painter.on(this.middle, wanted === "webgl")) || new PlainPainter(this.middle);
@@ -361,8 +355,7 @@ export class View {
 
   // Puts a picture in the canvases' place: browsers leave those out on paper.
   fix() {
-    this.print = Object.assign(document.createElement("img"), { alt: this.box.getAttribute("aria-label") });
-    this.print.src = this.composed().toDataURL();
+    this.print = made("img", { alt: this.box.getAttribute("aria-label"), src: this.composed().toDataURL() });
     this.box.append(this.print);
   }
 
@@ -372,7 +365,7 @@ export class View {
 
   // All three canvases as one.
   composed() {
-    const canvas = Object.assign(document.createElement("canvas"), { width: this.middle.width, height: this.middle.height });
+    const canvas = made("canvas", { width: this.middle.width, height: this.middle.height });
     const pen = canvas.getContext("2d");
     for (const layer of [this.under, this.middle, this.over]) pen.drawImage(layer, 0, 0);
     return canvas;
