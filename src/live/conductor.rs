@@ -437,3 +437,25 @@ fn collect(key: &str, value: &Value, found: &mut Vec<(String, Value)>) {
         _ => {}
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_beyond_the_range_of_single_floats_are_sent_with_their_digits() {
+        let places = [vec![1e-60, -3e-60], vec![2e60, 0.0]];
+        let channels = vec![None, Some(vec![f64::NAN, 0.0])];
+        let bytes = encoded(&Frame { clock: 1.0, places: places.clone(), channels }, 0.0, 0.0);
+        let quantity = |bytes: &[u8]| -> Vec<f64> {
+            let unit = f64::from_le_bytes(bytes[..8].try_into().expect("eight"));
+            let part = |four: &[u8]| f32::from_le_bytes(four.try_into().expect("four"));
+            bytes[8..].chunks(4).map(|four| unit * f64::from(part(four))).collect()
+        };
+        let sent: Vec<Vec<f64>> = bytes[48..].chunks(8 + 2 * 4).map(quantity).collect();
+        for (sent, value) in sent[..2].concat().into_iter().zip(places.concat()) {
+            assert!((sent - value).abs() <= 1e-7 * value.abs(), "{sent} for {value}");
+        }
+        assert!(sent[2][0].is_nan() && sent[2][1] == 0.0, "{sent:?}");
+    }
+}
