@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::command::{Command, Fault};
 use super::history::{self, History, Source};
-use super::session::{Frame, Refused, Session, Viewer, displacements};
+use super::session::{Frame, Refused, Session, Viewer};
 use crate::export::report::flight::{FlightRecorder, from_places};
 use crate::export::report::view::View;
 use crate::flock::role::Role;
@@ -381,7 +381,7 @@ pub(super) fn frame(
     let channel = |name: &str| (0..places.len()).map(|m| of(name, m)).collect();
     Frame {
         clock,
-        places: displacements(places, start),
+        displacements: places.since(start),
         channels: CHANNELS[..7].iter().map(|name| Some(channel(name))).collect(),
     }
 }

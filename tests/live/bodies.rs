@@ -303,7 +303,7 @@ fn tools_are_those_that_the_body_takes() {
 
 /// Where the page shows a particle, from where it was at first.
 fn shown(body: &Body, particle: usize) -> [f64; 2] {
-    body.frame(&[]).places.map(|along| along[particle])
+    body.frame(&[]).displacements.get(particle)
 }
 
 fn assert_near(found: [f64; 2], expected: [f64; 2]) {
