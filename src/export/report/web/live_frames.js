@@ -3,8 +3,7 @@
 export class LiveFrames {
   constructor(channels, count) {
     Object.assign(this, { channels, ready: 1 });
-    this.count = count;
-    this.values = new Map(["dx", "dy"].map((name) => [name, { unit: 1, parts: new Float32Array(count) }]));
+    this.values = new Map([["dx", new Float64Array(count)], ["dy", new Float64Array(count)]]);
   }
 
   has(name) {
@@ -12,20 +11,24 @@ export class LiveFrames {
   }
 
   read(name, frame, out) {
-    const { unit, parts } = this.values.get(name) ?? { unit: NaN, parts: out };
-    for (let i = 0; i < out.length; i++) out[i] = unit * parts[i];
+    const values = this.values.get(name);
+    if (values) out.set(values);
+    else out.fill(NaN);
   }
 
   // Takes up a message; null if it has another count than the page.
   take(buffer) {
     const view = new DataView(buffer);
     const [count, present] = [view.getUint32(4, true), view.getUint32(8, true)];
-    if (count !== this.count) return null;
+    if (count !== this.values.get("dx").length) return null;
     const [clock, sent, stepTime, frameTime] = [16, 24, 32, 40].map((at) => view.getFloat64(at, true));
     const names = ["dx", "dy", ...this.channels.filter((_, k) => (present >> k) & 1)];
     names.forEach((name, k) => {
       const at = 48 + (8 + 4 * count) * k;
-      this.values.set(name, { unit: view.getFloat64(at, true), parts: new Float32Array(buffer, at + 8, count) });
+      const unit = view.getFloat64(at, true);
+      const values = new Float64Array(new Float32Array(buffer, at + 8, count));
+      for (let i = 0; i < count; i++) values[i] *= unit;
+      this.values.set(name, values);
     });
     return { clock, sent, stepTime, frameTime };
   }
