@@ -59,7 +59,7 @@ pub fn live(arguments: &LiveArguments) -> Result<ExitCode, Refusal> {
     let folder = arguments.saved_in()?;
     let (about, from) = (arguments.about(&*session), folder_of(&arguments.file));
     let server = arguments.page.server()?;
-    let recording = arguments.record.open(&about, false, 1)?;
+    let recording = arguments.record.open(&about, 1)?;
     let door = arguments.page.announce(&server)?;
     let command = output::own_command_line();
     let stop = interrupt::serves();

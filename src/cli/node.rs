@@ -123,7 +123,7 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
             let mut about = About { member, namespace, ..file.about("node", &swarm) };
             about.set.extend(node.overrides(&swarm));
             about.taken_over = left.as_ref().map(|left| left.node.control().clone());
-            let recording = arguments.record.open(&about, false, life.number)?;
+            let recording = arguments.record.open(&about, life.number)?;
             if let Some(recording) = &recording {
                 node.record(recording.sink()).map_err(NodeError::from)?;
             }

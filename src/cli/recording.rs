@@ -30,7 +30,8 @@ impl RecordArguments {
         force: bool,
     ) -> Result<Option<Shared>, Refusal> {
         self.record.iter().try_for_each(|path| results.require_outside(path))?;
-        let recording = self.create(about, force, 1)?;
+        let path = self.record.as_deref();
+        let recording = path.map(|path| Recording::create(path, about, force)).transpose()?;
         // An end that keeps no results keeps no part of their recording either.
         interrupt::removes(recording.iter().map(|recording| recording.part().to_owned()));
         Ok(recording.map(Shared::new))
@@ -38,16 +39,13 @@ impl RecordArguments {
 
     /// The same beside nothing. A process that goes on where another ended leaves that one's file (`.mcap.part`) and writes
     /// FILE.2.mcap, and so on: the first of these names that is free.
-    pub fn open(&self, about: &About, force: bool, life: u32) -> Result<Option<Shared>, RecordError> {
-        Ok(self.create(about, force, life)?.map(Shared::new))
-    }
-
-    fn create(&self, about: &About, force: bool, life: u32) -> Result<Option<Recording>, RecordError> {
+    pub fn open(&self, about: &About, life: u32) -> Result<Option<Shared>, RecordError> {
         let of_life = |path: &PathBuf| {
             let mut names = (life..).map(|life| path.with_extension(format!("{life}.mcap")));
             if life == 1 { Some(path.clone()) } else { names.find(|path| path.symlink_metadata().is_err()) }
         };
-        self.record.as_ref().and_then(of_life).map(|path| Recording::create(&path, about, force)).transpose()
+        let path = self.record.as_ref().and_then(of_life);
+        path.map(|path| Recording::create(&path, about, false).map(Shared::new)).transpose()
     }
 
     /// Refuses a recording of what has none.
@@ -76,7 +74,7 @@ mod tests {
         let record = Some(folder.path().join("f.mcap"));
         let arguments = RecordArguments { record };
         let part = |life| {
-            let recording = arguments.open(&About::default(), false, life).expect("a free name");
+            let recording = arguments.open(&About::default(), life).expect("a free name");
             recording.and_then(|shared| shared.take()).expect("one is asked for").part().to_owned()
         };
         assert_eq!(part(2), folder.path().join("f.2.mcap.part"));
@@ -84,7 +82,7 @@ mod tests {
         assert_eq!(part(2), folder.path().join("f.3.mcap.part"));
         assert_eq!(part(4), folder.path().join("f.4.mcap.part"));
         std::fs::write(folder.path().join("f.mcap"), "of an earlier flight").expect("written");
-        let refused = arguments.open(&About::default(), false, 1).err().map(|error| error.to_string());
+        let refused = arguments.open(&About::default(), 1).err().map(|error| error.to_string());
         assert!(refused.is_some_and(|said| said.contains("f.mcap") && said.contains("exists")));
     }
 }

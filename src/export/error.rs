@@ -92,6 +92,9 @@ pub enum ExportError {
         /// The file.
         path: PathBuf,
     },
+    /// A run that is not of the sweep that it would be added to.
+    #[error("{0}")]
+    Sweep(#[from] sweep::SweepError),
     /// A figure's SVG cannot be drawn as PNG.
     #[error("the figure {} cannot be rendered: {reason}", .path.display())]
     Figure {

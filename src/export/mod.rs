@@ -311,7 +311,7 @@ fn figures_of_snapshot<'a>(
     ];
     let Some(cells) = engine.cells() else { return figures };
     let parted = move || here(engine.body(), snapshot.broken.iter().copied());
-    let displacement = move || figures::displacement(subject, snapshot);
+    let displacement = move || snapshot.positions.since(&subject.body.reference);
     let rotation = engine.stressed_at(snapshot.step).map_or(Rotation::Small, |by| by.rotation);
     let unit = units.stress.as_str();
     let in_cells = move || Stresses::in_cells(engine, snapshot.step, &displacement(), &parted());

@@ -26,6 +26,7 @@ use crate::flock::rules::Rotation;
 use crate::geometry::outline::Outline;
 use crate::geometry::point::area;
 use crate::scene::raw::RawScene;
+use crate::scene::text::exponent_of;
 use crate::scene::units::Units;
 use crate::scene::{BodySource, Scene};
 use crate::solve::equilibrium::Solved;
@@ -457,13 +458,10 @@ impl fmt::Display for Measured {
 
 /// Five digits.
 fn short(value: f64) -> String {
-    let text = format!("{value:.4e}");
-    // After rounding: 99.999999 has an exponent of 2.
-    let exponent = text.split_once('e').and_then(|(_, exponent)| exponent.parse::<i32>().ok());
-    match exponent {
+    match exponent_of(value, 5) {
         _ if value == 0.0 => "0".into(),
         Some(exponent @ -3..=4) => format!("{value:.*}", (4 - exponent) as usize),
-        _ => text,
+        _ => format!("{value:.4e}"),
     }
 }
 

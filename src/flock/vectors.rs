@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 pub use crate::geometry::point::distance;
+use crate::geometry::point::minus;
 
 /// One vector in the plane for each particle, shape \[count\] each: positions and displacements
 /// \[length unit of the scene, world frame\], forces, residuals.
@@ -76,6 +77,11 @@ impl Vectors {
     pub fn middle(&self) -> [f64; 2] {
         let sum = self.iter().fold([0.0; 2], |[a, b], [x, y]| [a + x, b + y]);
         sum.map(|s| s / self.len().max(1) as f64)
+    }
+
+    /// How far each is from the one of the same number in `start`.
+    pub fn since(&self, start: &Self) -> Self {
+        self.iter().zip(start.iter()).map(|(now, then)| minus(now, then)).collect()
     }
 
     /// Lowest and highest coordinate on each axis, over `indices`; `None` if there are none.

@@ -10,13 +10,14 @@ use serde_json::{Value, json};
 
 use super::command::Command;
 use super::history::{History, Source};
-use super::session::{Broken, Frame, Refused, Session, Viewer, displacements};
+use super::session::{Broken, Frame, Refused, Session, Viewer};
 use crate::continuum::mechanics::Stresses;
 use crate::engine::{Before, Engine};
 use crate::export::report::RunRecorder;
 use crate::export::report::view::View;
 use crate::flock::action::{Action, ActionKind};
 use crate::flock::rules::Mean;
+use crate::geometry::point::{minus, plus};
 use crate::scene::raw::*;
 use crate::scene::{Scene, SceneError, is_changeable};
 use load::load_key;
@@ -191,27 +192,26 @@ impl Session for Body {
     fn frame(&self, wanted: &[bool]) -> Frame {
         let engine = &self.history.now.engine;
         let (present, reference) = (engine.present(), &engine.body().reference);
-        let mut places = displacements(present, reference);
+        let mut displacements = present.since(reference);
         // A hand is not to wait for the next step, least of all where the body stands still.
         for (i, by) in self.history.now.ahead() {
             let (now, then) = (present.get(i), reference.get(i));
-            (0..2).for_each(|axis| places[axis][i] = (now[axis] + by[axis] - then[axis]) as f32);
+            displacements.set(i, minus(plus(now, by), then));
         }
-        let of = |name: &str| -> Vec<f32> {
+        let of = |name: &str| -> Vec<f64> {
             if name == "von_mises" {
-                let stresses = Stresses::von_mises_of_cells(engine).into_iter();
-                return stresses.map(|stress| stress as f32).collect();
+                return Stresses::von_mises_of_cells(engine);
             }
             let value = |i: usize| match name {
                 "pe2" => engine.pe2(i),
                 "pe1" => engine.pe1(i),
                 _ => engine.strain(i).map_or(f64::NAN, |strain| strain.largest()),
             };
-            (0..present.len()).map(|i| value(i) as f32).collect()
+            (0..present.len()).map(value).collect()
         };
         let channels = self.channels().into_iter().zip(wanted);
         let channels = channels.map(|(name, wanted)| wanted.then(|| of(name))).collect();
-        Frame { clock: engine.step() as f64, places, channels }
+        Frame { clock: engine.step() as f64, displacements, channels }
     }
 
     fn channels(&self) -> Vec<&'static str> {

@@ -372,21 +372,27 @@ const ROLES: u32 = 2;
 const BROKEN: u32 = 3;
 
 /// A frame: kind, count, the channels that follow as bits, nothing; the clock, when it was sent \[ms since 1970\], times
-/// of a step and of a frame \[ms\] as doubles; then every quantity.
+/// of a step and of a frame \[ms\] as doubles; then of every quantity its unit as a double, and its values in that as single
+/// floats. A unit is a power of two, which keeps the digits, of the size of the largest value: floats go no further than 1e38.
 fn encoded(frame: &Frame, step_time: f64, frame_time: f64) -> Bytes {
-    let Frame { clock, places: [dx, dy], channels } = frame;
-    let mut bytes = Vec::with_capacity(48 + 4 * dx.len() * (2 + channels.len()));
-    let bit = |(k, channel): (usize, &Option<Vec<f32>>)| u32::from(channel.is_some()) << k;
+    let Frame { clock, displacements, channels } = frame;
+    let mut bytes = Vec::with_capacity(48 + (8 + 4 * displacements.len()) * (2 + channels.len()));
+    let bit = |(k, channel): (usize, &Option<Vec<f64>>)| u32::from(channel.is_some()) << k;
     let present: u32 = channels.iter().enumerate().map(bit).sum();
-    for word in [FRAME, dx.len() as u32, present, 0] {
+    for word in [FRAME, displacements.len() as u32, present, 0] {
         bytes.extend(word.to_le_bytes());
     }
     let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     for value in [*clock, 1e3 * since.as_secs_f64(), step_time, frame_time] {
         bytes.extend(value.to_le_bytes());
     }
-    for values in [dx, dy].into_iter().chain(channels.iter().flatten()) {
-        values.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+    let channels = channels.iter().flatten().map(Vec::as_slice);
+    for values in displacements.components().into_iter().chain(channels) {
+        let sizes = values.iter().map(|value| value.abs()).filter(|size| size.is_finite());
+        let largest = sizes.fold(0.0, f64::max);
+        let unit = if largest > 0.0 { largest.log2().floor().exp2() } else { 1.0 };
+        bytes.extend(unit.to_le_bytes());
+        values.iter().for_each(|value| bytes.extend(((value / unit) as f32).to_le_bytes()));
     }
     bytes.into()
 }
@@ -430,5 +436,28 @@ fn collect(key: &str, value: &Value, found: &mut Vec<(String, Value)>) {
             table.iter().for_each(|(name, value)| collect(&format!("{key}.{name}"), value, found));
         }
         _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::vectors::Vectors;
+
+    #[test]
+    fn values_beyond_the_range_of_single_floats_are_sent_with_their_digits() {
+        let displacements = Vectors { x: vec![1e-60, -3e-60], y: vec![2e60, 0.0] };
+        let channels = vec![None, Some(vec![f64::NAN, 0.0])];
+        let bytes = encoded(&Frame { clock: 1.0, displacements: displacements.clone(), channels }, 0.0, 0.0);
+        let quantity = |bytes: &[u8]| -> Vec<f64> {
+            let unit = f64::from_le_bytes(bytes[..8].try_into().expect("eight"));
+            let part = |four: &[u8]| f32::from_le_bytes(four.try_into().expect("four"));
+            bytes[8..].chunks(4).map(|four| unit * f64::from(part(four))).collect()
+        };
+        let sent: Vec<Vec<f64>> = bytes[48..].chunks(8 + 2 * 4).map(quantity).collect();
+        for (sent, value) in sent[..2].concat().into_iter().zip(displacements.components().concat()) {
+            assert!((sent - value).abs() <= 1e-7 * value.abs(), "{sent} for {value}");
+        }
+        assert!(sent[2][0].is_nan() && sent[2][1] == 0.0, "{sent:?}");
     }
 }

@@ -21,16 +21,10 @@ pub type Broken = Vec<[u32; 2]>;
 pub struct Frame {
     /// Step, or seconds.
     pub clock: f64,
-    /// Displacements along x and y \[length\], shape \[2\]\[count\].
-    pub places: [Vec<f32>; 2],
+    /// Displacements \[length\], shape \[count\].
+    pub displacements: Vectors,
     /// Other quantities, those alone that a viewer looks at, shape \[channels\]\[count\].
-    pub channels: Vec<Option<Vec<f32>>>,
-}
-
-/// Displacements along x and y, for [`Frame::places`].
-pub(super) fn displacements(present: &Vectors, reference: &Vectors) -> [Vec<f32>; 2] {
-    let moved = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(n, t)| (n - t) as f32).collect();
-    [moved(&present.x, &reference.x), moved(&present.y, &reference.y)]
+    pub channels: Vec<Option<Vec<f64>>>,
 }
 
 /// Why something was not done.

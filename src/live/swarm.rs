@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::command::{Command, Fault};
 use super::history::{self, History, Source};
-use super::session::{Frame, Refused, Session, Viewer, displacements};
+use super::session::{Frame, Refused, Session, Viewer};
 use crate::export::report::flight::{FlightRecorder, from_places};
 use crate::export::report::view::View;
 use crate::flock::role::Role;
@@ -275,9 +275,9 @@ impl Session for Swarm {
         let target = |m: usize| sent.get(&m).copied().or_else(|| control.target(m));
         let mut frame = frame(control, &places, &clearance, &target, fleet.time());
         let now = velocities(self.flight());
-        let speed = now.iter().map(|[x, y]| x.hypot(*y) as f32).collect();
+        let speed = now.iter().map(|[x, y]| x.hypot(*y)).collect();
         let changes = now.iter().zip(&self.history.now.before);
-        let acceleration = changes.map(|(now, before)| (distance(*now, *before) / control.period()) as f32);
+        let acceleration = changes.map(|(now, before)| distance(*now, *before) / control.period());
         frame.channels.extend([Some(speed), Some(acceleration.collect())]);
         frame
     }
@@ -378,10 +378,10 @@ pub(super) fn frame(
         "target_dy" => to_target(m, 1),
         _ => measures.strain[m].map_or(f64::NAN, |strain| strain.largest()),
     };
-    let channel = |name: &str| (0..places.len()).map(|m| of(name, m) as f32).collect();
+    let channel = |name: &str| (0..places.len()).map(|m| of(name, m)).collect();
     Frame {
         clock,
-        places: displacements(places, start),
+        displacements: places.since(start),
         channels: CHANNELS[..7].iter().map(|name| Some(channel(name))).collect(),
     }
 }

@@ -32,6 +32,11 @@ pub fn decimals(value: f64, places: usize) -> String {
     if value.abs() < LONG { format!("{value:.places$}") } else { format!("{value:.places$e}") }
 }
 
+/// The power of ten of a finite number after it is rounded to so many digits: of 99.999999 to five it is 2.
+pub fn exponent_of(value: f64, digits: usize) -> Option<i32> {
+    format!("{value:.*e}", digits - 1).split_once('e')?.1.parse().ok()
+}
+
 /// A part as so many percent, without the digits that only binary fractions give it.
 pub fn percent(part: f64) -> String {
     format!("{} %", (100.0 * part) as f32)

@@ -193,6 +193,32 @@ fn a_runs_report_shows_at_the_end_what_final_csv_has_and_before_what_probes_csv_
 
 #[test]
 #[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
+fn bodies_beyond_the_range_of_single_floats_are_drawn_where_they_are() {
+    for spacing in ["1e-60", "1e60"] {
+        let scene = format!(
+            "title = \"T\"\nlattice = {{ kind = \"square\", spacing = {spacing} }}\n\
+             body.shape = {{ kind = \"grid\", columns = 6, rows = 4 }}\nstop.steps = 5\n\
+             roles = [{{ region = {{ kind = \"edge\", side = \"left\" }}, role = \"leader\", \
+             motion = {{ kind = \"velocity\", per_step = [{spacing}, 0.0] }} }}]\n"
+        );
+        let folder = temporary();
+        let file = folder.path().join("t.toml");
+        std::fs::write(&file, scene).expect("writable");
+        let report = Report::of(&["run", file.to_str().expect("plain")]);
+        let rows = report.table("final.csv");
+        for painter in ["2d", "webgl"] {
+            let seen = report.tour(&json!({ "hover": [0, 9, 23], "painter": painter }));
+            assert_sound(&seen);
+            assert_eq!(seen["frames"]["moved"], true, "{painter}: {}", seen["frames"]);
+            for (shown, particle) in seen["hovered"].as_array().expect("listed").iter().zip([0, 9, 23]) {
+                assert_same(shown, &rows[particle], &["x", "y"]);
+            }
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
 fn a_torn_body_shows_its_strain_and_its_broken_bonds() {
     let report = Report::of(&["run", "fracture"]);
     let seen = report.tour(&json!({ "hover": [500] }));

@@ -302,11 +302,11 @@ fn tools_are_those_that_the_body_takes() {
 }
 
 /// Where the page shows a particle, from where it was at first.
-fn shown(body: &Body, particle: usize) -> [f32; 2] {
-    body.frame(&[]).places.map(|along| along[particle])
+fn shown(body: &Body, particle: usize) -> [f64; 2] {
+    body.frame(&[]).displacements.get(particle)
 }
 
-fn assert_near(found: [f32; 2], expected: [f32; 2]) {
+fn assert_near(found: [f64; 2], expected: [f64; 2]) {
     assert!((0..2).all(|k| (found[k] - expected[k]).abs() < 1e-6), "{found:?}, not {expected:?}");
 }
 
@@ -341,7 +341,7 @@ fn a_drag_while_a_body_stands_still_is_shown_at_once_and_the_next_step_goes_ther
 
         pull(&mut body, 66, &["[1.0,0.5]"]);
         step(&mut body, steps);
-        assert_near(body.engine().displacement(66).map(|along| along as f32), there);
+        assert_near(body.engine().displacement(66), there);
         assert_near(shown(&body, 66), there);
         assert_replays(&body);
         step(&mut body, 1);
@@ -364,7 +364,7 @@ fn drags_one_after_another_while_a_body_stands_still_add_up() {
         }
         assert_near(shown(&body, particle), [x + 0.75, y + 0.5]);
         step(&mut body, 1);
-        assert_near(body.engine().displacement(particle).map(|along| along as f32), [x + 0.75, y + 0.5]);
+        assert_near(body.engine().displacement(particle), [x + 0.75, y + 0.5]);
         assert_replays(&body);
     }
     // Back to where it is: nothing is to come, and it is shown so.

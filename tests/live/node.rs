@@ -65,8 +65,12 @@ impl Flown {
 fn decoded(frame: &[u8]) -> (f64, Vec<Vec<f32>>) {
     let count = u32::from_le_bytes(frame[4..8].try_into().expect("four")) as usize;
     let clock = f64::from_le_bytes(frame[16..24].try_into().expect("eight"));
-    let values = frame[48..].chunks(4).map(|four| f32::from_le_bytes(four.try_into().expect("four")));
-    (clock, values.collect::<Vec<f32>>().chunks(count).map(<[f32]>::to_vec).collect())
+    let quantity = |quantity: &[u8]| {
+        let unit = f64::from_le_bytes(quantity[..8].try_into().expect("eight")) as f32;
+        let part = |four: &[u8]| f32::from_le_bytes(four.try_into().expect("four"));
+        quantity[8..].chunks(4).map(|four| unit * part(four)).collect()
+    };
+    (clock, frame[48..].chunks(8 + 4 * count).map(quantity).collect())
 }
 
 #[test]

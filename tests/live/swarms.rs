@@ -137,7 +137,7 @@ fn a_broken_bound_is_named_with_its_robots() {
 }
 
 /// A quantity of a robot as the page shows it.
-fn shown(swarm: &Live, name: &str, robot: usize) -> f32 {
+fn shown(swarm: &Live, name: &str, robot: usize) -> f64 {
     let channel = swarm.channels().iter().position(|known| *known == name).expect("a channel");
     swarm.frame(&[]).channels[channel].as_ref().expect("sent")[robot]
 }
@@ -153,7 +153,7 @@ fn a_leader_dragged_while_robots_stand_still_has_its_target_at_once() {
     for (name, expected) in
         [("target_dx", place[0] + 0.5 - from[0]), ("target_dy", place[1] - 0.25 - from[1])]
     {
-        assert!((f64::from(shown(&swarm, name, leader)) - expected).abs() < 1e-6, "{name}");
+        assert!((shown(&swarm, name, leader) - expected).abs() < 1e-6, "{name}");
     }
     fly(&mut swarm, 3);
     assert_replays(&swarm);
@@ -184,8 +184,8 @@ fn speed_and_acceleration_are_those_of_the_robots() {
     let [u, v] = swarm.flight().fleet().robots()[robot].velocity;
     let period = swarm.flight().control().period();
     assert!(u.hypot(v) > 0.0);
-    assert_eq!(shown(&swarm, "speed", robot), u.hypot(v) as f32);
-    assert_eq!(shown(&swarm, "acceleration", robot), ((u - x).hypot(v - y) / period) as f32);
+    assert_eq!(shown(&swarm, "speed", robot), u.hypot(v));
+    assert_eq!(shown(&swarm, "acceleration", robot), (u - x).hypot(v - y) / period);
 }
 
 #[cfg(feature = "cli")]

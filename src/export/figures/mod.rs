@@ -51,7 +51,6 @@ pub use configuration::configuration;
 pub use energy::pe1;
 use page::Bounds;
 pub use probes::probes;
-pub(super) use stress::displacement;
 pub use stress::stress;
 pub use svg::INK;
 pub use von_mises::von_mises;

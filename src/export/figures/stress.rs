@@ -101,15 +101,10 @@ pub(super) fn bounds(subject: &Subject<'_>, snapshot: &Snapshot, places: &Vector
 
 /// Where particles are drawn, and the factor by which their displacements are enlarged for that.
 pub(super) fn enlarged(subject: &Subject<'_>, snapshot: &Snapshot) -> (Vectors, f64) {
-    let (reference, displacement) = (&subject.body.reference, displacement(subject, snapshot));
+    let (reference, displacement) =
+        (&subject.body.reference, snapshot.positions.since(&subject.body.reference));
     // Large displacements are drawn as they are: a bent body is to look as bent as it is.
     let [largest] = subject.largest([largest_of(&displacement, subject.drawn(&snapshot.roles))]);
     let factor = enlargement(largest, bounds(subject, snapshot, reference)).max(1.0);
     (displaced(reference, &displacement, factor), factor)
-}
-
-/// Displacement of every particle \[length\], shape \[count\].
-pub(in crate::export) fn displacement(subject: &Subject<'_>, snapshot: &Snapshot) -> Vectors {
-    let moved = |(now, then): ([f64; 2], [f64; 2])| [now[0] - then[0], now[1] - then[1]];
-    snapshot.positions.iter().zip(subject.body.reference.iter()).map(moved).collect()
 }

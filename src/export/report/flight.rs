@@ -113,9 +113,7 @@ impl FlightRecorder {
         is_last: bool,
     ) {
         let count = places.len();
-        let moved = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(n, t)| n - t).collect();
-        let (dx, dy): (Vec<f64>, Vec<f64>) =
-            (moved(&places.x, &self.start.x), moved(&places.y, &self.start.y));
+        let moved = places.since(&self.start);
         let mut clearance = Vec::new();
         control.filter().clearance(places, &mut clearance);
         let away = from_places(control, places).unwrap_or_else(|| vec![f64::NAN; count]);
@@ -124,7 +122,8 @@ impl FlightRecorder {
         let strain: Vec<f64> =
             measures.strain.iter().map(|strain| strain.map_or(f64::NAN, |s| s.largest())).collect();
         // In the order of the channels.
-        let values = [&dx[..], &dy, &clearance, &away, speed, acceleration, &age, &measures.pe1, &strain];
+        let values =
+            [&moved.x[..], &moved.y, &clearance, &away, speed, acceleration, &age, &measures.pe1, &strain];
         let (period, values) = (period as usize, |k: usize, _: &Channel| values[k].into());
         if is_last { self.frames.keep_last(period, values) } else { self.frames.keep(period, values) }
     }

@@ -16,6 +16,7 @@ use super::super::figures::chart::Chart;
 pub(super) use super::super::figures::escaped;
 use super::super::manifest::create_buffered;
 use super::view::View;
+use crate::scene::text::exponent_of;
 
 /// Name of the file.
 pub const FILE: &str = "report.html";
@@ -216,17 +217,17 @@ fn table_html(table: &Table) -> String {
     )
 }
 
-/// Up to six digits, without zeros at the end; small and large ones with a power of ten.
+/// Up to six digits, before the point up to seven, without zeros at the end; small and large ones with a power of ten.
 pub fn number(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return if value.is_finite() { "0".into() } else { value.to_string() };
+    match exponent_of(value, 6) {
+        None => value.to_string(),
+        _ if value == 0.0 => "0".into(),
+        Some(exponent @ -4..=6) => {
+            let text = format!("{value:.*}", usize::try_from(5 - exponent).unwrap_or(0));
+            if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+        }
+        Some(_) => format!("{value:.4e}"),
     }
-    let exponent = value.abs().log10().floor() as i32;
-    if !(-4..7).contains(&exponent) {
-        return format!("{value:.4e}");
-    }
-    let text = format!("{value:.*}", usize::try_from(5 - exponent).unwrap_or(0));
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
 
 /// The notes of a scene or swarm and its file, under its name within and at the beginning of a title.
@@ -314,6 +315,8 @@ mod tests {
 
     #[test]
     fn numbers_are_short() {
+        let at_a_power = [999999.7, 9999999.7, 9.9999999e-5, -0.99999999, 0.0].map(number);
+        assert_eq!(at_a_power, ["1000000", "1.0000e7", "0.0001", "-1", "0"]);
         let texts = [0.25, -1234.5678, 1e-7, 12345678.0, 3.0, f64::NAN].map(number);
         assert_eq!(texts, ["0.25", "-1234.57", "1.0000e-7", "1.2346e7", "3", "NaN"]);
     }

@@ -316,7 +316,27 @@ fn whole_rows(text: &[u8]) -> io::Result<(Vec<Row>, u64)> {
 #[derive(Debug)]
 pub struct Journal {
     path: PathBuf,
-    file: Mutex<File>,
+    kept: Mutex<Kept>,
+}
+
+#[derive(Debug)]
+struct Kept {
+    file: File,
+    /// Of the runs that it holds: see [`Row::files`].
+    checksums: BTreeMap<String, Option<u32>>,
+}
+
+impl Kept {
+    /// Refuses a run with other files than those before.
+    fn require_same_files(&mut self, journal: &Path, row: &Row) -> Result<(), SweepError> {
+        for (name, &sum) in &row.files {
+            if *self.checksums.entry(name.clone()).or_insert(sum) != sum {
+                let folder = journal.parent().unwrap_or(journal);
+                return Err(SweepError::apart(folder, folder, &format!("{name} changed between them")));
+            }
+        }
+        Ok(())
+    }
 }
 
 impl Journal {
@@ -335,7 +355,7 @@ impl Journal {
         write_file(&path, lines.map_err(ExportError::io("write", &path))?.concat())?;
         // It takes its name when it can be gone on with.
         folder.keep_unfinished()?;
-        Self::open(folder)
+        Self::open(folder.folder(), rows)
     }
 
     /// Goes on with the journal of a sweep that was killed or interrupted, after its last whole row.
@@ -343,28 +363,28 @@ impl Journal {
     /// # Errors
     /// A file that cannot be written.
     pub fn resume(folder: &OutputFolder, found: &StoredSweep) -> Result<Self, ExportError> {
-        let journal = Self::open(folder)?;
-        {
-            let file = journal.file.lock().unwrap_or_else(PoisonError::into_inner);
-            file.set_len(found.whole).map_err(ExportError::io("write", &journal.path))?;
-        }
+        let mut journal = Self::open(folder.folder(), &found.rows)?;
+        let kept = journal.kept.get_mut().unwrap_or_else(PoisonError::into_inner);
+        kept.file.set_len(found.whole).map_err(ExportError::io("write", &journal.path))?;
         Ok(journal)
     }
 
-    fn open(folder: &OutputFolder) -> Result<Self, ExportError> {
-        let path = folder.path(RUNS);
+    fn open(folder: &Path, rows: &[Row]) -> Result<Self, ExportError> {
+        let path = folder.join(RUNS);
         require_regular(&path).map_err(ExportError::io("write", &path))?;
         let file = OpenOptions::new().append(true).open(&path).map_err(ExportError::io("write", &path))?;
-        Ok(Self { path, file: Mutex::new(file) })
+        let checksums = rows.iter().flat_map(|row| row.files.clone()).collect();
+        Ok(Self { path, kept: Mutex::new(Kept { file, checksums }) })
     }
 
     /// Adds a run; once this returns, a kill does not lose it.
     ///
     /// # Errors
-    /// The system refuses to write.
+    /// A run with other files than those before, or the system refuses to write.
     pub fn add(&self, row: &Row) -> Result<(), ExportError> {
         let line = line(row).map_err(ExportError::io("write", &self.path))?;
-        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.require_same_files(&self.path, row)?;
         let add = |file: &mut File| {
             let before = file.metadata()?.len();
             // A part of a row would damage the journal for the rows that other threads still add.
@@ -372,7 +392,7 @@ impl Journal {
                 let _ = file.set_len(before);
             })
         };
-        add(&mut file).map_err(ExportError::io("write", &self.path))
+        add(&mut kept.file).map_err(ExportError::io("write", &self.path))
     }
 }
 
@@ -406,6 +426,21 @@ mod tests {
         for cut in two.len()..all.len() {
             assert_eq!(read(&all[..cut]), ((0..2).map(row).collect(), two.len() as u64), "{cut}");
         }
+    }
+
+    #[test]
+    fn a_run_with_another_file_than_those_before_is_refused_at_once() {
+        let place = std::env::temp_dir().join(format!("flockform-journal-{}", std::process::id()));
+        std::fs::create_dir(&place).expect("writable");
+        std::fs::write(place.join(RUNS), "").expect("writable");
+        let journal = Journal::open(&place, &[row(0)]).expect("a journal");
+        let changed = Row { files: BTreeMap::from([("a.csv".into(), Some(8))]), ..row(2) };
+        let refused = journal.add(&changed).expect_err("another file").to_string();
+        journal.add(&row(1)).expect("the same files");
+        let written = std::fs::read(place.join(RUNS)).expect("readable");
+        std::fs::remove_dir_all(&place).expect("removed");
+        assert!(refused.contains("a.csv changed between them") && refused.contains("help: restore"));
+        assert_eq!(whole_rows(&written).expect("whole").0, [row(1)]);
     }
 
     #[test]

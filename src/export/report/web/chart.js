@@ -1,6 +1,7 @@
 // Charts as SVG: lines and points over two axes, with the animation's clock as a line to drag.
 
 import { logTicks, placeWords, ticks, words } from "./colour.js";
+import { made } from "./shown.js";
 
 const HEIGHT = 300;
 const ROOM = { top: 10, right: 16, bottom: 42 };
@@ -23,15 +24,10 @@ export class Chart {
   constructor(plot, parent, { tip, seek }) {
     Object.assign(this, { plot, tip, seek });
     this.hidden = new Set();
-    this.card = document.createElement("figure");
-    this.card.className = "card";
-    const title = Object.assign(document.createElement("h2"), { textContent: plot.title });
-    this.legend = Object.assign(document.createElement("div"), { className: "legend" });
-    this.legend.setAttribute("role", "group");
-    this.legend.setAttribute("aria-label", "Series");
-    this.holder = document.createElement("div");
-    this.card.append(title, this.legend, this.holder);
-    if (plot.note) this.card.append(Object.assign(document.createElement("p"), { className: "note", textContent: plot.note }));
+    this.legend = made("div", { class: "legend", role: "group", "aria-label": "Series" });
+    this.holder = made("div");
+    this.card = made("figure", { class: "card" }, made("h2", {}, plot.title), this.legend, this.holder);
+    if (plot.note) this.card.append(made("p", { class: "note" }, plot.note));
     parent.append(this.card);
     this.drawLegend();
     new ResizeObserver(() => this.draw()).observe(this.holder);
@@ -40,10 +36,7 @@ export class Chart {
   drawLegend() {
     this.plot.series.forEach((series, n) => {
       if (!series.name) return;
-      const button = document.createElement("button");
-      button.type = "button";
-      button.setAttribute("aria-pressed", "true");
-      button.title = "Show or hide";
+      const button = made("button", { type: "button", "aria-pressed": "true", title: "Show or hide" });
       const sample = svg("svg", { viewBox: "0 0 22 12", "aria-hidden": "true" }, button);
       this.drawMark(sample, series, [[2, 6], [20, 6]], [[11, 6]]);
       button.append(series.name);

@@ -45,8 +45,10 @@ export function palette(colourOf) {
 export function words(value, digits = 6) {
   if (!Number.isFinite(value)) return "–";
   if (value === 0) return "0";
-  const size = Math.abs(value);
-  if (size >= 1e-4 && size < 1e7) return String(Number(value.toPrecision(digits))).replace("-", "−");
+  // After rounding: 9999999.7 is 1e7.
+  const rounded = Number(value.toPrecision(digits));
+  const size = Math.abs(rounded);
+  if (size >= 1e-4 && size < 1e7) return String(rounded).replace("-", "−");
   const [mantissa, exponent] = value.toExponential(digits - 1).split("e");
   return `${Number(mantissa)}e${Number(exponent)}`.replaceAll("-", "−");
 }

@@ -5,7 +5,7 @@ import { keep, showTip, tip } from "./numbers.js";
 import { draw, drawNow } from "./page.js";
 import { saveDrawing, savePicture, sharply } from "./picture.js";
 import { takePalette } from "./scale.js";
-import { bodies, element, shown, state } from "./shown.js";
+import { bodies, element, made, shown, state } from "./shown.js";
 
 // More particles than this are shown as a surface even by role: dots would be one blot.
 const MOST_DOTS = 12000;
@@ -189,7 +189,7 @@ export function nameControls() {
   element("find-name").textContent = animation.noun[0].toUpperCase() + animation.noun.slice(1);
   element("noun").textContent = animation.noun;
   element("magnify-label").hidden = isSwarm;
-  element("find-names").replaceChildren(...animation.names.map((name) => Object.assign(document.createElement("option"), { value: name })));
+  element("find-names").replaceChildren(...animation.names.map((value) => made("option", { value })));
 }
 
 export function listenToCopy() {

@@ -6,7 +6,7 @@ import { breakBonds, kindOf, LiveFrames } from "./live_frames.js";
 import { isDesigning, keepHands, listenToDesign, showDesign, takeDesign, takeUpHands } from "./live_design.js";
 import { drawAlarms, drawDashes, drawTargets, takeFormation, takeTool, toolName } from "./live_tools.js";
 import { drawNow, started } from "./page.js";
-import { bodies, data, element, shown, state } from "./shown.js";
+import { bodies, data, element, made, shown, state } from "./shown.js";
 
 // Time between two looks at the range of a quantity and at the room in the view, which change as the body moves, in ms.
 const RANGE_EVERY = 250;
@@ -133,8 +133,7 @@ function takeStatus(status) {
   const alarms = status.alarms.join("\n");
   if (alarms !== session.alarms) {
     session.alarms = alarms;
-    const line = (text) => Object.assign(document.createElement("li"), { textContent: text });
-    element("live-alarms").replaceChildren(...status.alarms.map(line));
+    element("live-alarms").replaceChildren(...status.alarms.map((text) => made("li", {}, text)));
   }
   const sets = status.sets.join("\n");
   if (sets !== session.sets) {
@@ -172,17 +171,15 @@ function tidy(value) {
 
 // A box for a number; an empty one stands for none.
 function addNumber(key, value) {
-  const label = document.createElement("label");
   const now = tidy(String(value ?? ""));
-  const input = Object.assign(document.createElement("input"), { type: "number", step: "any", value: now, placeholder: "none" });
+  const input = made("input", { type: "number", step: "any", value: now, placeholder: "none" });
   Object.assign(input.dataset, { key, now });
   input.addEventListener("change", () => {
     // What was emptied shows again what holds.
     if (input.value === "") input.value = input.dataset.now;
     else set(key, (input.value = tidy(input.value)));
   });
-  label.append(`${key} `, input);
-  element("live-numbers").append(label);
+  element("live-numbers").append(made("label", {}, `${key} `, input));
   return input;
 }
 
@@ -250,8 +247,7 @@ function listenToNode({ commands, manoeuvres }) {
   onSubmit("node-move", () => moveFormation());
   onSubmit("node-manoeuvre", () => ask({ do: "set-formation", name: element("node-manoeuvre").elements.name.value }));
   element("node-manoeuvre").hidden = manoeuvres.length === 0;
-  const options = manoeuvres.map((name) => Object.assign(document.createElement("option"), { value: name, textContent: name }));
-  element("node-manoeuvre").elements.name.replaceChildren(...options);
+  element("node-manoeuvre").elements.name.replaceChildren(...manoeuvres.map((name) => made("option", { value: name }, name)));
   const mark = (from, to) => (session.pull = from && [from, to]);
   shown.tool = (view, at) => takeFormation(view, at, mark, moveFormation);
 }
@@ -327,9 +323,7 @@ function showNumbers() {
   data.live.keys.forEach(([key, value]) => addNumber(key, value));
   const known = data.live.keys.filter(([, value]) => value !== null).map(([key, value]) => `${key}=${value}`);
   const offered = data.live.swarm ? known : [...known, ...SUGGESTED.filter((text) => !known.some((one) => one.startsWith(text.split("=")[0])))];
-  element("live-keys").replaceChildren(
-    ...offered.map((value) => Object.assign(document.createElement("option"), { value })),
-  );
+  element("live-keys").replaceChildren(...offered.map((value) => made("option", { value })));
 }
 
 // A slider that holds the leaders while it is moved, and goes back to the middle when it is let go.

@@ -2,7 +2,7 @@
 
 import { drawLine, placeAt, toolName } from "./live_tools.js";
 import { keep } from "./numbers.js";
-import { bodies, data, element, shown, state } from "./shown.js";
+import { bodies, data, element, made, shown, state } from "./shown.js";
 
 // Below this the pointer has not moved, in pixels.
 const STILL = 4;
@@ -80,8 +80,7 @@ export function listenToDesign(ask, isAtStart) {
   });
   element("design-lead").addEventListener("click", () => edit("lead", { leads: !leads(bodies[0], shown.views[0].kept) }));
   element("design-remove").addEventListener("click", () => edit("remove"));
-  const line = (text) => Object.assign(document.createElement("li"), { textContent: text });
-  element("design-exact").replaceChildren(...data.live.design.map(line));
+  element("design-exact").replaceChildren(...data.live.design.map((text) => made("li", {}, text)));
 }
 
 // What the hands of the reader were at, kept while the page is loaded anew.

@@ -3,7 +3,7 @@
 export class LiveFrames {
   constructor(channels, count) {
     Object.assign(this, { channels, ready: 1 });
-    this.values = new Map([["dx", new Float32Array(count)], ["dy", new Float32Array(count)]]);
+    this.values = new Map([["dx", new Float64Array(count)], ["dy", new Float64Array(count)]]);
   }
 
   has(name) {
@@ -23,7 +23,13 @@ export class LiveFrames {
     if (count !== this.values.get("dx").length) return null;
     const [clock, sent, stepTime, frameTime] = [16, 24, 32, 40].map((at) => view.getFloat64(at, true));
     const names = ["dx", "dy", ...this.channels.filter((_, k) => (present >> k) & 1)];
-    names.forEach((name, k) => this.values.set(name, new Float32Array(buffer, 48 + 4 * k * count, count)));
+    names.forEach((name, k) => {
+      const at = 48 + (8 + 4 * count) * k;
+      const unit = view.getFloat64(at, true);
+      const values = new Float64Array(new Float32Array(buffer, at + 8, count));
+      for (let i = 0; i < count; i++) values[i] *= unit;
+      this.values.set(name, values);
+    });
     return { clock, sent, stepTime, frameTime };
   }
 }

@@ -2,20 +2,16 @@
 
 import { placeWords, words } from "./colour.js";
 import { draw } from "./page.js";
-import { bodies, element, shown } from "./shown.js";
+import { bodies, element, made, shown } from "./shown.js";
 import { isUnit } from "./view.js";
 
 export function numbersOf(body, particle) {
-  const list = document.createElement("dl");
-  list.className = "numbers";
-  const row = (label, value, exact) => {
-    const pair = document.createElement("div");
+  const list = made("dl", { class: "numbers" });
+  const row = ([key, label], value, exact) => {
+    const number = made("data", { value: exact }, value);
+    number.dataset.key = key;
+    const pair = made("div", {}, made("dt", {}, label), made("dd", {}, number));
     pair.style.display = "contents";
-    const number = Object.assign(document.createElement("data"), { value: exact, textContent: value });
-    number.dataset.key = label[0];
-    const dd = document.createElement("dd");
-    dd.append(number);
-    pair.append(Object.assign(document.createElement("dt"), { textContent: label[1] }), dd);
     list.append(pair);
   };
   const role = body.animation.role_names[body.roles()[particle]];
@@ -31,7 +27,7 @@ export function numbersOf(body, particle) {
 
 export function heading(body, particle) {
   const noun = body.animation.names.length ? "" : `${body.animation.noun} `;
-  return Object.assign(document.createElement("strong"), { textContent: `${noun}${body.name(particle)}` });
+  return made("strong", {}, `${noun}${body.name(particle)}`);
 }
 
 export function showTip(view, particle, event) {

@@ -9,7 +9,7 @@ import { choose, listenToControls, listenToCopy, listenToKeys, listenToTheme, li
 import { showKept, tip } from "./numbers.js";
 import { Player } from "./player.js";
 import { drawScale, quantities, shade } from "./scale.js";
-import { bodies, data, element, shown, state } from "./shown.js";
+import { bodies, data, element, made, shown, state } from "./shown.js";
 import { View } from "./view.js";
 
 let isAsked = false;
@@ -58,9 +58,7 @@ async function startFilm() {
   const { animation } = bodies[0];
   shown.player = new Player(animation.times, showFrame);
   element("time").max = String(animation.times.length - 1);
-  element("quantity").replaceChildren(
-    ...quantities().map(({ key, label }) => Object.assign(document.createElement("option"), { value: key, textContent: label })),
-  );
+  element("quantity").replaceChildren(...quantities().map(({ key, label }) => made("option", { value: key }, label)));
   shown.views = bodies.map((body) => new View(body, element("views")));
   shown.views.forEach((view) => {
     view.prepare();

@@ -7,7 +7,7 @@ import { CRACK_DASH } from "./view.js";
 import { SvgPen } from "./svg_pen.js";
 import { draw, drawNow } from "./page.js";
 import { crackKeys, quantities, ramp, roleKeys, scaleOf } from "./scale.js";
-import { element, shown, state } from "./shown.js";
+import { element, made, shown, state } from "./shown.js";
 
 // In CSS pixels.
 const MARGIN = 16;
@@ -42,9 +42,8 @@ export function sharply(act) {
 
 function writePicture() {
   const sheet = sheetOf();
-  const canvas = document.createElement("canvas");
   const { ratio } = shown.views[0];
-  Object.assign(canvas, { width: Math.round(sheet.width * ratio), height: Math.round(sheet.height * ratio) });
+  const canvas = made("canvas", { width: Math.round(sheet.width * ratio), height: Math.round(sheet.height * ratio) });
   const pen = canvas.getContext("2d");
   pen.scale(ratio, ratio);
   sheet.paint(pen);
@@ -59,10 +58,8 @@ function writeDrawing() {
 }
 
 function save(href, ending) {
-  const link = document.createElement("a");
   const { label } = quantities().find(({ key }) => key === state.quantity);
-  Object.assign(link, { href, download: `${document.title}, ${label}, ${element("now").textContent}.${ending}` });
-  link.click();
+  made("a", { href, download: `${document.title}, ${label}, ${element("now").textContent}.${ending}` }).click();
   if (href.startsWith("blob:")) setTimeout(() => URL.revokeObjectURL(href), 1000);
 }
 

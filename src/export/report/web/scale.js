@@ -1,7 +1,7 @@
 // The colouring of particles: quantities, their range over the animation, the colour bar.
 
 import { SHADES, diverging, palette, themeColour, themeText, ticks, viridis, words } from "./colour.js";
-import { bodies, element, shown, state } from "./shown.js";
+import { bodies, element, made, shown, state } from "./shown.js";
 import { markOf } from "./marks.js";
 import { isUnit } from "./view.js";
 
@@ -160,7 +160,7 @@ export function scaleOf() {
 
 // The colours of the scale in a row.
 export function ramp() {
-  const canvas = Object.assign(document.createElement("canvas"), { width: SHADES, height: 1 });
+  const canvas = made("canvas", { width: SHADES, height: 1 });
   canvas.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(state.palette.subarray(0, 4 * SHADES)), SHADES, 1), 0, 0);
   return canvas;
 }
@@ -182,15 +182,13 @@ export function drawScale() {
     return;
   }
   const { name, ends, ticks: marks, more } = scaleOf();
-  const bar = Object.assign(document.createElement("div"), { className: "ramp" });
-  bar.append(ramp());
+  const bar = made("div", { class: "ramp" }, ramp());
   for (const [part, text] of marks) {
-    const tick = Object.assign(document.createElement("span"), { className: "tick", textContent: text });
+    const tick = made("span", { class: "tick" }, text);
     tick.style.left = `${100 * part}%`;
     bar.append(tick);
   }
-  const span = (text, className = "") => Object.assign(document.createElement("span"), { textContent: text, className });
-  scale.replaceChildren(span(name, "name"), bar, span(more), ...cracks);
+  scale.replaceChildren(made("span", { class: "name" }, name), bar, made("span", {}, more), ...cracks);
   scale.setAttribute("aria-label", `Colours: ${name} from ${words(ends[0], 3)} to ${words(ends[1], 3)}`);
 }
 
@@ -199,9 +197,7 @@ export function plural(name, count) {
 }
 
 export function key([text, colour, mark]) {
-  const span = Object.assign(document.createElement("span"), { className: "key" });
-  const sign = Object.assign(document.createElement("i"), { className: mark });
+  const sign = made("i", { class: mark });
   sign.style.setProperty("--own", colour);
-  span.append(sign, text);
-  return span;
+  return made("span", { class: "key" }, sign, text);
 }

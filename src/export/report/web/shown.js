@@ -3,6 +3,15 @@
 import { Body } from "./body.js";
 
 export const element = (id) => document.getElementById(id);
+
+// A new element with these attributes and what stands in it.
+export function made(tag, attributes = {}, ...within) {
+  const one = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) one.setAttribute(name, value);
+  one.append(...within);
+  return one;
+}
+
 export const data = JSON.parse(element("data").textContent);
 export const bodies = data.stages.map((animation, number) => new Body(animation, number));
 

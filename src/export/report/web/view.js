@@ -4,7 +4,7 @@ import { Painter } from "./painter.js";
 import { PlainPainter } from "./painter2d.js";
 import { marksOf } from "./marks.js";
 import { multiples, placeWords, themeColour, themeText, ticks, words } from "./colour.js";
-import { shown } from "./shown.js";
+import { made, shown } from "./shown.js";
 
 // Ways of more particles would cover each other.
 const MOST_WAYS = 400;
@@ -26,20 +26,17 @@ export class View {
   constructor(body, parent) {
     this.body = body;
     this.origin = [0, 0];
+    // Places are drawn in a unit of a particle's size: single floats go no further than 1e38. A power of two keeps the digits.
+    const { spacing } = body.animation;
+    this.unit = spacing > 0 ? 2 ** Math.floor(Math.log2(spacing)) : 1;
     this.marked = -1;
     this.kept = -1;
-    const figure = document.createElement("figure");
-    figure.className = "view";
-    if (body.animation.name) figure.append(Object.assign(document.createElement("figcaption"), { textContent: body.animation.name }));
-    this.box = document.createElement("div");
-    this.box.className = "canvas";
-    this.box.tabIndex = 0;
-    this.box.setAttribute("role", "application");
-    this.box.setAttribute("aria-label", `${body.animation.name || "Body"}: ${body.count} ${body.animation.noun}s. Plus and minus zoom, shift with arrows moves.`);
-    [this.under, this.middle, this.over] = [0, 1, 2].map(() => document.createElement("canvas"));
-    this.box.append(this.under, this.middle, this.over);
-    figure.append(this.box);
-    parent.append(figure);
+    const { name, noun } = body.animation;
+    const label = `${name || "Body"}: ${body.count} ${noun}s. Plus and minus zoom, shift with arrows moves.`;
+    [this.under, this.middle, this.over] = [0, 1, 2].map(() => made("canvas"));
+    this.box = made("div", { class: "canvas", tabindex: 0, role: "application", "aria-label": label }, this.under, this.middle, this.over);
+    const caption = name ? [made("figcaption", {}, name)] : [];
+    parent.append(made("figure", { class: "view" }, ...caption, this.box));
     // Where neither is asked for, the one that is faster here.
     const wanted = new URLSearchParams(location.search).get("painter");
     this.painter = (wanted !== "2d" && Painter.on(this.middle, wanted === "webgl")) || new PlainPainter(this.middle);
@@ -110,13 +107,13 @@ export class View {
     // A finger and the wheel scroll the page as long as there is nothing more to see here.
     this.box.classList.toggle("zoomed", !show.isFitted || Boolean(shown.tool));
     this.resize();
-    const { body, places, shades, radii, ratio } = this;
+    const { body, places, shades, radii, ratio, unit } = this;
     body.go(show.frame);
     const { X, Y, dx, dy, animation } = body;
     const origin = this.shown(this.origin);
     for (let i = 0; i < body.count; i++) {
-      const x = X[i] + show.factor * dx[i] - this.origin[0];
-      const y = Y[i] + show.factor * dy[i] - this.origin[1];
+      const x = (X[i] + show.factor * dx[i] - this.origin[0]) / unit;
+      const y = (Y[i] + show.factor * dy[i] - this.origin[1]) / unit;
       // NaN is culled by some drivers and not by others; far away is outside everywhere.
       const isThere = Number.isFinite(x) && Number.isFinite(y);
       places[2 * i] = isThere ? (show.turned ? y : x) : 1e30;
@@ -134,7 +131,7 @@ export class View {
       places, values: shades, radii, marks: this.marks,
       palette: show.palette, isFlat: show.isFlat, layers: show.layers,
       spacing: animation.radii.length ? Math.max(animation.spacing * scale, 2 * least) : animation.spacing * scale,
-      camera: { x: show.camera.x - origin[0], y: show.camera.y - origin[1], scale },
+      camera: { x: (show.camera.x - origin[0]) / unit, y: (show.camera.y - origin[1]) / unit, scale: scale * unit },
       bondsFrom, bondCount: body.bonds.length - bondsFrom,
       trianglesFrom, triangleCount: body.triangles.length - trianglesFrom,
       bondColour: themeColour("bond"),
@@ -155,7 +152,7 @@ export class View {
 
   at(particle) {
     const origin = this.shown(this.origin);
-    return this.pixel([this.places[2 * particle] + origin[0], this.places[2 * particle + 1] + origin[1]]);
+    return this.pixel([0, 1].map((k) => this.unit * this.places[2 * particle + k] + origin[k]));
   }
 
   pen(canvas) {
@@ -287,7 +284,7 @@ export class View {
     this.ways = [];
     for (let frame = 0; frame < body.frames.ready; frame++) {
       body.go(frame);
-      const way = new Float32Array(2 * body.count);
+      const way = new Float64Array(2 * body.count);
       for (let i = 0; i < body.count; i++) way.set([body.dx[i], body.dy[i]], 2 * i);
       this.ways.push(way);
     }
@@ -344,9 +341,10 @@ export class View {
   nearest(px, py) {
     const { camera } = this.show;
     const origin = this.shown(this.origin);
-    const x = camera.x + (px - this.width / 2) / camera.scale - origin[0];
-    const y = camera.y - (py - this.height / 2) / camera.scale - origin[1];
-    let [best, found] = [(REACH / camera.scale) ** 2, -1];
+    const scale = camera.scale * this.unit;
+    const x = (camera.x - origin[0]) / this.unit + (px - this.width / 2) / scale;
+    const y = (camera.y - origin[1]) / this.unit - (py - this.height / 2) / scale;
+    let [best, found] = [(REACH / scale) ** 2, -1];
     for (let i = 0; i < this.body.count; i++) {
       const [u, v] = [this.places[2 * i] - x, this.places[2 * i + 1] - y];
       const away = u * u + v * v;
@@ -357,8 +355,7 @@ export class View {
 
   // Puts a picture in the canvases' place: browsers leave those out on paper.
   fix() {
-    this.print = Object.assign(document.createElement("img"), { alt: this.box.getAttribute("aria-label") });
-    this.print.src = this.composed().toDataURL();
+    this.print = made("img", { alt: this.box.getAttribute("aria-label"), src: this.composed().toDataURL() });
     this.box.append(this.print);
   }
 
@@ -368,7 +365,7 @@ export class View {
 
   // All three canvases as one.
   composed() {
-    const canvas = Object.assign(document.createElement("canvas"), { width: this.middle.width, height: this.middle.height });
+    const canvas = made("canvas", { width: this.middle.width, height: this.middle.height });
     const pen = canvas.getContext("2d");
     for (const layer of [this.under, this.middle, this.over]) pen.drawImage(layer, 0, 0);
     return canvas;

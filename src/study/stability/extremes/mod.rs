@@ -178,15 +178,15 @@ impl End {
         (0..self.reference.len()).map(moved).fold(1.0, f64::max)
     }
 
-    /// How far the body is from another, `factor` times as large and displaced `push` times as far, over its
-    /// own displacements. Infinite where they differ in number, not a number where one is lost.
-    fn apart_from(&self, other: &Self, factor: f64, push: f64) -> f64 {
+    /// How far the body is from another, `factor` times as large, over its own displacements. Infinite where they differ in
+    /// number, not a number where one is lost.
+    fn apart_from(&self, other: &Self, factor: f64) -> f64 {
         if self.reference.len() != other.reference.len() {
             return f64::INFINITY;
         }
         let size = self.size();
         let apart = |i| {
-            let ([ax, ay], [bx, by]) = (self.moved(i, self.spacing), other.moved(i, other.spacing * push));
+            let ([ax, ay], [bx, by]) = (self.moved(i, self.spacing), other.moved(i, other.spacing));
             // The spacing itself may be off.
             let spacing = other.spacing / self.spacing / factor;
             distance([ax, ay], [bx * spacing, by * spacing]) / size

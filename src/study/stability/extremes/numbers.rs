@@ -48,7 +48,7 @@ fn against_ordinary(
     let (base, end) = (rest(ORDINARY, "f64", "multigrid")?, rest(numbers, precision, solver)?);
     let factor = numbers.spacing / ORDINARY.spacing;
     let check = "the same body in ordinary numbers and double precision";
-    Ok(Outcome::judged(base.apart_from(&end, factor, 1.0), within, check))
+    Ok(Outcome::judged(base.apart_from(&end, factor), within, check))
 }
 
 fn rest(numbers: Numbers, precision: &str, solver: &str) -> Result<End, SceneError> {

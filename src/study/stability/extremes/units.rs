@@ -61,5 +61,5 @@ fn scaled(
     };
     // As far as the solver itself says that it knows.
     let within = f64::max(1e-9, 2.0 * end.known_to);
-    Ok(Outcome::judged(base.apart_from(&end, factor, 1.0), within, check))
+    Ok(Outcome::judged(base.apart_from(&end, factor), within, check))
 }
