@@ -17,7 +17,6 @@ use crate::export::report::RunRecorder;
 use crate::export::report::view::View;
 use crate::flock::action::{Action, ActionKind};
 use crate::flock::rules::Mean;
-use crate::geometry::point::{minus, plus};
 use crate::scene::raw::*;
 use crate::scene::{Scene, SceneError, is_changeable};
 use load::load_key;
@@ -196,7 +195,7 @@ impl Session for Body {
         // A hand is not to wait for the next step, least of all where the body stands still.
         for (i, by) in self.history.now.ahead() {
             let (now, then) = (present.get(i), reference.get(i));
-            displacements.set(i, minus(plus(now, by), then));
+            displacements.set(i, [0, 1].map(|axis| now[axis] + by[axis] - then[axis]));
         }
         let of = |name: &str| -> Vec<f64> {
             if name == "von_mises" {
