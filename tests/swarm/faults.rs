@@ -311,3 +311,57 @@ fn an_emergency_stop_latches_and_the_programs_wait() {
     fly_on(&mut flight, 50);
     assert_ne!(flight.fleet().places(), before);
 }
+
+/// A pose that is corrected, a robot that is carried, a simulation that begins anew: it did not drive there.
+#[test]
+fn a_robot_that_is_found_elsewhere_in_an_emergency_stop_is_held_there() {
+    let mut control = Control::new(&load_swarm("square", &[])).expect("laid out");
+    let (period, places) = (control.period(), control.formation().places.clone());
+    let fly = |control: &mut Control, ticks: std::ops::Range<u32>, by: f64| {
+        let mut target = None;
+        for now in ticks.map(|tick| f64::from(tick) * period) {
+            for (m, [x, y]) in places.iter().enumerate() {
+                let away = if m == 6 { by } else { 0.0 };
+                let pose = Pose { position: [x, y + away], yaw: 0.0, stamp: now, frame_is_right: true };
+                // Some are not believed at once.
+                control.receive(m, pose, now).ok();
+            }
+            control.tick(now);
+            target = control.target(6);
+        }
+        target.expect("heard")
+    };
+    let at = |by: f64| [places.get(6)[0], places.get(6)[1] + by];
+    fly(&mut control, 0..20, 0.0);
+    control.emergency_stop();
+    assert!(distance(fly(&mut control, 20..40, 0.0), at(0.0)) < 1e-9);
+    for (ticks, by) in [(40..46, -8.0), (46..100, -8.0), (0..1, -12.0), (1..40, -12.0)] {
+        let target = fly(&mut control, ticks, by);
+        assert!(distance(target, at(by)) < 1e-9, "{target:?}, not {:?}", at(by));
+    }
+}
+
+#[test]
+fn a_robot_that_is_found_elsewhere_has_not_gone_there_at_the_speed_of_light() {
+    let limits = ["limits={ speed = 1.0, acceleration = 0.1, clearance = 0.1 }"];
+    let mut control = Control::new(&load_swarm("square", &limits)).expect("laid out");
+    let (period, places) = (control.period(), control.formation().places.clone());
+    for tick in 0..60 {
+        let now = f64::from(tick) * period;
+        for (m, [x, y]) in places.iter().enumerate() {
+            let away = if m == 6 && tick >= 30 { 8.0 } else { 0.0 };
+            let pose = Pose { position: [x, y + away], yaw: 0.0, stamp: now, frame_is_right: true };
+            let believed = control.receive(m, pose, now).is_ok();
+            if m == 6 && away > 0.0 && believed {
+                control.tick(now);
+                let target = control.target(6).expect("heard");
+                // From rest in a period.
+                assert!(distance(target, [x, y + away]) < 0.11 * period * period, "{target:?}");
+                assert!(target[1] < y + away, "towards where it belongs: {target:?}");
+                return;
+            }
+        }
+        control.tick(now);
+    }
+    panic!("it was never believed");
+}

@@ -246,14 +246,18 @@ impl Control {
     /// # Errors
     /// The reason for rejecting the pose, which then changes the counts alone.
     pub fn receive(&mut self, member: usize, pose: Pose, now: f64) -> Result<(), Rejection> {
-        let before = self.watch.pose(member);
+        let before = self.watch.pose(member).filter(|before| self.watch.limits().goes_on(before, &pose));
         let verdict = self.watch.receive(member, pose, now);
         match (&verdict, before) {
-            (Ok(()), Some(before)) if pose.stamp > before.stamp => {
+            (Ok(()), Some(before)) => {
                 let v = [0, 1].map(|k| (pose.position[k] - before.position[k]) / (pose.stamp - before.stamp));
                 self.velocity.set(member, v);
             }
-            (Ok(()), _) => self.velocity.set(member, [0.0; 2]),
+            // It did not go there from where it was last: in a stop it stays where it is by now.
+            (Ok(()), None) => {
+                self.velocity.set(member, [0.0; 2]);
+                self.held[member] = None;
+            }
             (Err(_), _) => self.rejected[member] = true,
         }
         let (dynamics, deviation) = (self.dynamics(), self.filter.limits().deviation);

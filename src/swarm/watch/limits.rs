@@ -88,6 +88,12 @@ impl WatchLimits {
         (far, self.jump_speed * (to.stamp - from.stamp) + self.jump_slack)
     }
 
+    /// Whether a member may have gone from one pose to another that is newer.
+    pub(in crate::swarm) fn goes_on(&self, from: &Pose, to: &Pose) -> bool {
+        let (far, allowed) = self.jump(from, to);
+        to.stamp > from.stamp && far <= allowed
+    }
+
     pub(super) fn health(&self, age: Option<f64>) -> Health {
         match age {
             None => Health::Waiting,
