@@ -344,6 +344,46 @@ fn a_node_ticks_as_its_simulator_s_time_goes_on_and_rests_while_it_stands() {
     assert_eq!(node.control().ticks(), steps);
 }
 
+/// Simulators whose world is reset and paused go on saying what time it is there, and nothing else.
+#[test]
+fn a_node_whose_simulation_is_reset_and_paused_goes_on_and_says_how_it_fares() {
+    let peers = peers();
+    let keeper = peers.theirs.node("/", "time_keeper_that_resets").expect("a node");
+    let clock = keeper.publisher::<Clock>("/reset/clock", Quality::BEST_EFFORT).expect("out");
+    let pose = keeper.publisher("/robot_7/pose", Quality::BEST_EFFORT).expect("out");
+    let reports =
+        keeper.subscription::<DiagnosticArray>("/diagnostics", Quality::reliable(50)).expect("hears");
+    let remapped = [&SIMULATED[..], &["-r", "/clock:=/reset/clock"]].concat();
+    let mut node = FormationNode::open(&square(&PATIENT), &arguments(&remapped), None).expect("a node");
+    node.watch_middleware().expect("a watchdog");
+    let (mut time, mut paused, mut heard) = (100.0, None::<Instant>, 0);
+    let begun = Instant::now();
+    let lives = node.run_while(&AtomicBool::new(false), &mut |node| {
+        assert!(begun.elapsed() < PATIENCE, "robot_7 is not heard");
+        if paused.is_none() {
+            time += 0.01;
+            let mut message = stamped([1.5, 1.5], "map");
+            message.header.stamp = Time::from_seconds(time);
+            pose.publish(&message).expect("sent");
+            if node.control().health(6) == Health::Fresh {
+                (time, paused) = (0.0, Some(Instant::now()));
+            }
+        }
+        clock.publish(&Clock { clock: Time::from_seconds(time) }).expect("sent");
+        while let Some((report, _)) = reports.take() {
+            let is_own = |status: &DiagnosticStatus| status.name == "/flockform: formation";
+            let is_waiting = node.control().health(6) == Health::Waiting;
+            heard += usize::from(is_waiting && report.status.iter().any(is_own));
+        }
+        std::thread::sleep(Duration::from_millis(5));
+        // A few periods, by which it knows of the reset.
+        time = paused.map_or(time, |since| since.elapsed().as_secs_f64().min(0.5));
+        paused.is_none_or(|since| since.elapsed() < Duration::from_secs(5))
+    });
+    assert!(lives, "the middleware is not given up");
+    assert!(heard >= 2, "{heard} reports in a pause of four seconds");
+}
+
 #[test]
 fn two_fleets_of_one_file_fly_beside_each_other_each_in_its_namespace() {
     let peers = peers();

@@ -255,18 +255,25 @@ impl FormationNode {
     /// after each tick and, under a simulator's clock, at least once in a period of the computer's.
     pub fn run_while(&mut self, stop: &AtomicBool, look: &mut dyn FnMut(&Self) -> bool) -> bool {
         while !stop.load(Ordering::Relaxed) {
-            match self.wait() {
+            let due = self.wait();
+            match due {
                 Some(missed) => {
                     self.statistics.missed += missed;
                     self.tick();
                 }
-                None => self.attend(),
+                None => {
+                    self.attend();
+                    self.diagnose(self.time(), false);
+                }
             }
             let hears_any = self.pulse.is_some() && self.hears_any();
             if let Some(pulse) = &self.pulse {
                 match &self.endpoints {
-                    Some(endpoints) => pulse.note_peers(hears_any, || endpoints.link.left()),
-                    None => pulse.listens_to_none(),
+                    // Poses come in by ticks: while a simulator's time stands, that there are none means nothing.
+                    Some(endpoints) if due.is_some() || hears_any => {
+                        pulse.note_peers(hears_any, || endpoints.link.left());
+                    }
+                    _ => pulse.listens_to_none(),
                 }
             }
             if self.pulse.as_ref().is_some_and(|pulse| pulse.is_given_up()) {
@@ -373,7 +380,7 @@ impl FormationNode {
         self.report(now);
     }
 
-    /// Says that the clock is silent: once in the log, and in diagnostics, which are due by the computer's time then.
+    /// Says that the clock is silent: once in the log, and in diagnostics.
     fn watch_clock(&mut self, stamp: f64) {
         let trouble = self.no_clock();
         let was_missed = std::mem::replace(&mut self.has_missed_clock, trouble.is_some());
@@ -381,11 +388,7 @@ impl FormationNode {
         if !was_missed {
             tracing::warn!("{trouble}");
         }
-        // Not recorded: the time of a recording is the loop's, which stands.
-        if self.statistics.is_due(diagnostics::DIAGNOSTICS, system_time(), 1.0) {
-            let message = self.diagnosis(stamp);
-            self.statistics.sent(self.diagnostics.publish(&message));
-        }
+        self.diagnose(stamp, false);
     }
 
     fn no_clock(&self) -> Option<String> {
@@ -559,22 +562,31 @@ impl FormationNode {
         self.statistics.message(&self.control, names, header, refused, is_configured, &troubles)
     }
 
-    /// Publishes state and markers at `state_rate`, diagnostics at 1 Hz.
+    /// Publishes state and markers at `state_rate`, and diagnostics.
     fn report(&mut self, now: f64) {
         if let Some(endpoints) = &mut self.endpoints
             && self.statistics.is_due(diagnostics::STATE, now, self.settings.state_rate)
         {
             endpoints.report(&self.control, &self.origin, now, &mut self.statistics);
         }
-        if self.statistics.is_due(diagnostics::DIAGNOSTICS, now, 1.0) {
-            let message = self.diagnosis(now);
+        self.diagnose(now, true);
+    }
+
+    /// Publishes diagnostics once a second of the computer's time, which goes on when a simulator's stands; not recorded then, for
+    /// the time of a recording is the loop's.
+    fn diagnose(&mut self, stamp: f64, is_recorded: bool) {
+        if !self.statistics.is_due(diagnostics::DIAGNOSTICS, system_time(), 1.0) {
+            return;
+        }
+        let message = self.diagnosis(stamp);
+        if is_recorded {
             let recorder = match &mut self.endpoints {
                 Some(endpoints) => &mut endpoints.link.recorder,
                 None => &mut self.recorder,
             };
-            copy(recorder, &self.diagnostics, &message, now);
-            self.statistics.sent(self.diagnostics.publish(&message));
+            copy(recorder, &self.diagnostics, &message, stamp);
         }
+        self.statistics.sent(self.diagnostics.publish(&message));
     }
 }
 
