@@ -357,6 +357,7 @@ fn slot(secured: Option<[u8; 12]>) -> Vec<Line> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::{Mutex, PoisonError};
     use std::time::Duration;
 
     use super::*;
@@ -389,6 +390,9 @@ mod tests {
 
     /// A socket behind a filter, and whether a packet comes in.
     fn door(secured: Option<[u8; 12]>) -> (UdpSocket, impl Fn(&[u8]) -> bool) {
+        // One after the other: a door is set before every socket since, another test's too.
+        static SETTING: Mutex<()> = Mutex::new(());
+        let _setting = SETTING.lock().unwrap_or_else(PoisonError::into_inner);
         let before = sockets().expect("a process");
         let inside = UdpSocket::bind("127.0.0.1:0").expect("a socket");
         inside.set_read_timeout(Some(Duration::from_millis(100))).expect("a socket");
