@@ -346,7 +346,7 @@ fn a_drag_while_a_body_stands_still_is_shown_at_once_and_the_next_step_goes_ther
         assert_replays(&body);
         step(&mut body, 1);
         assert_eq!(body.engine().roles()[66].name(), "follower");
-        assert!(body.engine().displacement(66)[0] < f64::from(there[0]), "its neighbours pull it back");
+        assert!(body.engine().displacement(66)[0] < there[0], "its neighbours pull it back");
         step(&mut body, 7);
         assert_replays(&body);
     }
