@@ -162,7 +162,7 @@ mount -o remount,size=64m "$disk"
 until_it test -e o.unfinished/checkpoint
 kill -INT $run
 wait $run
-ls o
+ls o/summary.json o.unfinished/checkpoint
 "#;
 
 #[test]
@@ -184,7 +184,8 @@ fn a_full_disk_costs_checkpoints_as_long_as_it_is_full_and_no_longer() {
     // Two parts at a time and the first rank's own, beside what a run begins with.
     let names: usize = found.lines().next().and_then(|line| line.parse().ok()).unwrap_or(usize::MAX);
     assert!(names <= 4, "{found}, {said}");
-    assert!(found.contains("summary.json"), "{found}, {said}");
+    // Where the ranks had no time to write what there is, the checkpoint is left.
+    assert!(found.contains("o/summary.json") || found.contains("o.unfinished/checkpoint"), "{found}, {said}");
     for once in ["no checkpoint at step", "checkpoints are written again"] {
         assert_eq!(said.matches(once).count(), 1, "{found}, {said}");
     }
