@@ -226,6 +226,7 @@ impl Neighbours {
     }
 
     /// The particles that `particle` sees, in summation order.
+    #[inline]
     pub fn of(&self, particle: usize) -> &[u32] {
         &self.index[self.bonds(particle)]
     }

@@ -51,11 +51,13 @@ impl<T: Copy + Default> Vectors<T> {
     }
 
     /// Both coordinates of one vector.
+    #[inline]
     pub fn get(&self, index: usize) -> [T; 2] {
         [self.x[index], self.y[index]]
     }
 
     /// Overwrites one vector.
+    #[inline]
     pub fn set(&mut self, index: usize, vector: [T; 2]) {
         [self.x[index], self.y[index]] = vector;
     }

@@ -30,10 +30,15 @@
 //! `x_i <- x_i + D^-1 (sum of f_i + load)`, `D = sum R K_ii R'`. A body turned by any angle moves as the unturned one does,
 //! in turned axes; where rotations are small this is the plain material rule.
 
+use smallvec::SmallVec;
+
 use super::ParticleState;
 use super::averaged::{self, PatchCell};
-use crate::flock::block::{Block, apply, inverse, plus, product, transposed};
-use crate::geometry::point::{cross, dot};
+use crate::flock::block::{self, Block, apply, inverse, product, transposed};
+use crate::geometry::point::{cross, dot, plus};
+
+/// Something of each corner of a cell; on the stack unless an outline has glued cells together.
+type Corners<T> = SmallVec<[T; 6]>;
 
 /// The stiffness of a cell.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -68,6 +73,7 @@ pub struct Turn {
 
 impl Turn {
     /// From `F21 - F12` and `F11 + F22 - 2`.
+    #[inline]
     fn of_gradient(skew: f64, dilatation: f64) -> Option<Self> {
         let trace = 2.0 + dilatation;
         let size = f64::hypot(skew, trace);
@@ -94,17 +100,20 @@ impl Turn {
     }
 
     /// A matrix in the turned axes: `R block R'`.
+    #[inline]
     pub fn turned(self, block: &Block) -> Block {
         let forth = [[self.cos, -self.sin], [self.sin, self.cos]];
         product(&product(&forth, block), &transposed(forth))
     }
 
     /// A vector in the turned axes: `R vector`.
+    #[inline]
     pub(crate) fn forth(self, [x, y]: [f64; 2]) -> [f64; 2] {
         [self.cos * x - self.sin * y, self.sin * x + self.cos * y]
     }
 
     /// `R' (X + u) - X`.
+    #[inline]
     pub(super) fn strained(self, Corner { reference: [x, y], displacement: [u, v] }: Corner) -> [f64; 2] {
         [
             self.versed * x + self.sin * y + self.cos * u + self.sin * v,
@@ -123,7 +132,7 @@ pub struct CellRow {
     /// The energy that the cell stores \[force length\].
     pub energy: f64,
     /// Second derivatives of the energy to the corner and each corner \[force / length\], shape \[corners\].
-    pub tangent: Vec<Block>,
+    pub tangent: Corners<Block>,
 }
 
 impl Element {
@@ -132,6 +141,7 @@ impl Element {
         self.gradients.len()
     }
 
+    #[inline]
     fn block(&self, a: usize, b: usize) -> &Block {
         &self.stiffness[a * self.corners() + b]
     }
@@ -150,18 +160,13 @@ impl Element {
     /// The force of the cell on the corner `own` \[force, world frame\], and its rotation; `None` as [`Element::turn`].
     pub fn force_on(&self, own: usize, corner: impl Fn(usize) -> Corner) -> Option<(Turn, [f64; 2])> {
         let (turn, y, z) = self.places(corner)?;
-        let (mut moment, mut force) = (0.0, [0.0; 2]);
-        for (j, &z) in z.iter().enumerate() {
-            let pull = self.stiffness_times(j, &y);
-            moment += cross(z, pull);
-            if j == own {
-                force = pull;
-            }
-        }
-        Some((turn, turn.forth(self.balanced(own, force, moment / turn.trace))))
+        let l = self.stiffness_times(&y);
+        let moment = z.iter().zip(&l).fold(0.0, |sum, (&z, &l)| sum + cross(z, l));
+        Some((turn, turn.forth(self.balanced(own, l[own], moment / turn.trace))))
     }
 
     /// `-(K y - M S g / q)` of a corner, from `K y` and `M / q`.
+    #[inline]
     fn balanced(&self, own: usize, pull: [f64; 2], moment: f64) -> [f64; 2] {
         let by_angle = quarter(self.gradients[own]);
         [moment * by_angle[0] - pull[0], moment * by_angle[1] - pull[1]]
@@ -169,25 +174,23 @@ impl Element {
 
     /// The rotation of the cell, and `y = R' x - X` and `z = R' x` of its corners.
     #[allow(clippy::type_complexity)]
-    fn places(&self, corner: impl Fn(usize) -> Corner) -> Option<(Turn, Vec<[f64; 2]>, Vec<[f64; 2]>)> {
-        let corners: Vec<Corner> = (0..self.corners()).map(corner).collect();
+    fn places(
+        &self,
+        corner: impl Fn(usize) -> Corner,
+    ) -> Option<(Turn, Corners<[f64; 2]>, Corners<[f64; 2]>)> {
+        let corners: Corners<Corner> = (0..self.corners()).map(corner).collect();
         let turn = self.turn(|k| corners[k])?;
-        let y: Vec<[f64; 2]> = corners.iter().map(|&corner| turn.strained(corner)).collect();
-        let z = corners
-            .iter()
-            .zip(&y)
-            .map(|(corner, y)| [y[0] + corner.reference[0], y[1] + corner.reference[1]]);
-        let z = z.collect();
+        let y: Corners<_> = corners.iter().map(|&corner| turn.strained(corner)).collect();
+        let z = y.iter().zip(&corners).map(|(&y, corner)| plus(y, corner.reference)).collect();
         Some((turn, y, z))
     }
 
-    /// `(K v)_j`.
-    fn stiffness_times(&self, j: usize, v: &[[f64; 2]]) -> [f64; 2] {
-        let row = &self.stiffness[j * self.corners()..][..self.corners()];
-        row.iter().zip(v).fold([0.0; 2], |sum, (block, &v)| {
-            let [x, y] = apply(block, v);
-            [sum[0] + x, sum[1] + y]
-        })
+    /// `K v`.
+    #[inline]
+    fn stiffness_times(&self, v: &[[f64; 2]]) -> Corners<[f64; 2]> {
+        let row =
+            |row: &[Block]| row.iter().zip(v).fold([0.0; 2], |sum, (block, &v)| plus(sum, apply(block, v)));
+        self.stiffness.chunks_exact(v.len()).map(row).collect()
     }
 
     /// [`Element::force_on`] with its derivatives.
@@ -197,9 +200,8 @@ impl Element {
     pub fn row(&self, own: usize, corner: impl Fn(usize) -> Corner) -> Option<CellRow> {
         let (turn, y, z) = self.places(corner)?;
         let count = self.corners();
-        let turned: Vec<[f64; 2]> = z.iter().map(|&z| quarter(z)).collect();
-        let l: Vec<[f64; 2]> = (0..count).map(|j| self.stiffness_times(j, &y)).collect();
-        let a: Vec<[f64; 2]> = (0..count).map(|j| self.stiffness_times(j, &turned)).collect();
+        let turned: Corners<_> = z.iter().map(|&z| quarter(z)).collect();
+        let (l, a) = (self.stiffness_times(&y), self.stiffness_times(&turned));
         let sum = |term: &dyn Fn(usize) -> f64| (0..count).map(term).sum::<f64>();
         let moment = sum(&|k| cross(z[k], l[k])) / turn.trace;
         let c = sum(&|k| dot(turned[k], a[k]) - dot(z[k], l[k]));
@@ -259,7 +261,7 @@ pub fn pull<'a, P: Iterator<Item = PatchCell<'a>>>(
     let cells = cells.filter_map(|cell| cell.pull(&neighbour));
     let patches = patches.filter_map(|(k, cells)| averaged::pull(k, cells, &neighbour));
     cells.chain(patches).fold(Default::default(), |(sum, holds), (force, hold)| {
-        ([sum[0] + force[0], sum[1] + force[1]], plus(&holds, &hold))
+        (plus(sum, force), block::plus(&holds, &hold))
     })
 }
 
@@ -279,6 +281,7 @@ pub fn target(own: &ParticleState, (force, hold): ([f64; 2], Block), held: [bool
     Some([component(0), component(1)])
 }
 
+#[inline]
 pub(super) fn quarter([x, y]: [f64; 2]) -> [f64; 2] {
     [-y, x]
 }

@@ -15,7 +15,7 @@ fn quadrilateral() -> (Element, Vec<[f64; 2]>) {
         let spring: Block = [0, 1].map(|d| [0, 1].map(|e| strength * along[d] * along[e]));
         let negative = spring.map(|row| row.map(|k| -k));
         for (i, j, block) in [(a, a, spring), (b, b, spring), (a, b, negative), (b, a, negative)] {
-            stiffness[4 * i + j] = plus(&stiffness[4 * i + j], &block);
+            stiffness[4 * i + j] = block::plus(&stiffness[4 * i + j], &block);
         }
     }
     (Element { stiffness, gradients: (0..4).map(gradient).collect() }, corners)
