@@ -31,6 +31,8 @@ pub struct EngineState<'a> {
     roles: Cow<'a, [Role]>,
     /// Of each particle the last change that has taken it; empty where no change has a condition.
     taken_by: Cow<'a, [u32]>,
+    /// How many role changes there are, those that were added by hand among them.
+    changes: usize,
     leaders: Vec<Led>,
     guided: Cow<'a, [Guided]>,
     #[serde(with = "serde_impls::breaks")]
@@ -56,12 +58,11 @@ pub struct WrongState {
 }
 
 const CHANGES: &str = "role changes";
-const TAKEN: &str = "particles that changes took";
 
 impl WrongState {
     /// The other cause where there are more role changes than planned.
     fn or_to_a_change(&self) -> &'static str {
-        if [CHANGES, TAKEN].contains(&self.what) && self.found > self.planned {
+        if self.what == CHANGES && self.found > self.planned {
             ", or to this one with role changes that were added by hand, which no state has\n  \
              help: add them to the changes of the plan's setup before it takes the state"
         } else {
@@ -105,6 +106,7 @@ impl<'a> EngineState<'a> {
                 None => Cow::Borrowed(&engine.taken_by),
                 Some(_) => own.iter().filter_map(|&i| engine.taken_by.get(i).copied()).collect(),
             },
+            changes: engine.changes.len(),
             leaders: leaders.map(leading).collect(),
             guided: Cow::Borrowed(&engine.guided),
             breaks: Cow::Borrowed(&engine.breaks),
@@ -174,6 +176,7 @@ impl<'a> EngineState<'a> {
             previous: Cow::Owned(previous),
             roles: Cow::Owned(roles),
             taken_by: Cow::Owned(taken_by),
+            changes: pieces.first().map_or(0, |(_, state)| state.changes),
             leaders,
             guided: Cow::Owned(Vec::new()),
             broken: setup
@@ -228,7 +231,9 @@ impl<'a> EngineState<'a> {
         require("particles", self.present.len(), count)?;
         require("former places", self.previous.len(), count)?;
         require("roles", self.roles.len(), count)?;
-        require(TAKEN, self.taken_by.len(), engine.taken_by.len())?;
+        // Those that the plan has beside came after the state.
+        require(CHANGES, self.changes.max(engine.changes.len()), engine.changes.len())?;
+        require("particles that changes took", self.taken_by.len(), engine.taken_by.len())?;
         let bits = engine.flock.bonds.as_ref().map(|_| engine.flock.neighbours.index.len().div_ceil(8));
         require("bytes of bonds", self.broken.as_ref().map_or(0, Vec::len), bits.unwrap_or(0))?;
         // A number from a file is an index only when it is below what it counts; one that is not says that there are more.

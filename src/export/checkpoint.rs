@@ -46,7 +46,7 @@ use crate::scene::Scene;
 pub const FILE: &str = "checkpoint";
 pub(super) const PART: &str = "checkpoint.part";
 const MAGIC: [u8; 8] = *b"FLOCKFRM";
-const VERSION: u32 = 8;
+const VERSION: u32 = 9;
 const HEADER: usize = 24;
 const PROGRAM_VERSION: &str = env!("CARGO_PKG_VERSION");
 

@@ -247,11 +247,12 @@ fn a_state_with_a_role_added_by_hand_asks_for_it_and_goes_on_in_a_plan_that_has_
     use crate::flock::motion::{Interpolation, Keyframe, Motion};
     use crate::flock::role::Role;
     let scene = scene("tension", &[]);
-    for when in [None, Some(Condition { quantity: Quantity::X, above: Some(-100.0), below: None })] {
+    let condition = Some(Condition { quantity: Quantity::X, above: Some(-100.0), below: None });
+    for (when, leads) in [(None, true), (condition, true), (None, false)] {
         let mut engine = Engine::new(plan(&scene).setup);
         let particle = engine.roles().iter().position(|&role| role == Role::Follower).expect("a follower");
         let frames = vec![Keyframe { step: 9.0, displacement: [1.0, 0.0] }];
-        let motion = Some(Motion::Keyframes { frames, interpolation: Interpolation::Linear });
+        let motion = leads.then_some(Motion::Keyframes { frames, interpolation: Interpolation::Linear });
         let added = RoleChange { when, motion, ..RoleChange::new(vec![particle], Role::Leader, 2) };
         engine.add_role_change(added.clone());
         (0..4).for_each(|_| engine.advance());

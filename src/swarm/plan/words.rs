@@ -168,8 +168,9 @@ impl Exactness {
                 by.sort_unstable();
                 by.dedup();
                 let lost: Vec<&String> = needed.iter().map(|one| &one.name).collect();
+                let need = if by.len() == 1 { "needs" } else { "need" };
                 format!(
-                    "where any one robot is lost the others go on to do so, but {} need one of {}",
+                    "where any one robot is lost the others go on to do so, but {} {need} one of {}",
                     listed(&by),
                     listed(&lost)
                 )
