@@ -93,7 +93,7 @@ fn a_run_in_parts_has_figures_of_all_and_a_report_of_a_sample() {
 fn a_run_in_parts_is_recorded_whole_and_its_film_shows_the_same_sample_on_any_number_of_ranks() {
     let folder = temporary();
     std::fs::write(folder.path().join("fitted.toml"), FITTED).expect("written");
-    let grid = ["--set", "body.shape={kind=\"grid\",columns=300,rows=210}", "--steps", "20"];
+    let grid = ["--set", "body.shape={kind=\"grid\",columns=300,rows=210}", "--steps", "6"];
     let short = "load_steps={ramp={steps=4},every=2}";
     let fine = ["--set", "lattice.spacing=0.12", "--set", short, "--steps", "6"];
     let scenes: [(&str, &str, &[&str]); 2] = [("tension", "pe1", &grid), ("fitted.toml", "von-mises", &fine)];
