@@ -237,7 +237,7 @@ fn a_checkpoint_that_cannot_be_gone_on_from_is_refused_by_name_and_left_alone() 
     refused(&flipped, &resume, &["o.unfinished/checkpoint is corrupted", "help:"]);
     let mut newer = good.clone();
     newer[8] = 99;
-    refused(&newer, &resume, &["is of layout 99, this is layout 8", "help:"]);
+    refused(&newer, &resume, &["is of layout 99, this is layout 9", "help:"]);
     refused(b"thesis", &resume, &["is no checkpoint of flockform"]);
     let foreign = ["run", "fracture", "--resume", "o"];
     refused(&good, &foreign, &["belongs to another scene", "`title` was", "help:"]);
