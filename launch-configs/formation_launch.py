@@ -50,6 +50,7 @@ def generate_launch_description():
             respawn=True,
             respawn_delay=2.0,
         ),
+        # Not started again where it ends: it sees to that by itself, and another would know of no emergency stop.
         Node(
             package="flockform",
             executable="flockform",
@@ -57,7 +58,5 @@ def generate_launch_description():
             arguments=["node", swarm],
             parameters=[LaunchConfiguration("parameters"), {"use_sim_time": use_sim_time}],
             output="screen",
-            respawn=True,
-            respawn_delay=2.0,
         ),
     ])

@@ -109,6 +109,23 @@ fn the_views_show_topics_and_frames_that_the_node_has() {
     assert!(place("pkg=\"rviz2\"") < place("<include "));
 }
 
+/// One that is started anew is not in the emergency stop in which its robots may stand, and leads them back to where its programs begin.
+#[test]
+fn launch_files_start_no_node_again_that_has_ended() {
+    let folder = Path::new(CHECKOUT).join("launch-configs");
+    let mut nodes = 0;
+    for name in files(&folder).iter().filter(|name| name.contains("_launch.")) {
+        let text = std::fs::read_to_string(folder.join(name)).expect("readable");
+        let (begins, ends) = if name.ends_with(".py") { (" Node(", "\n        )") } else { ("<node ", ">") };
+        let started = text.split(begins).skip(1).filter_map(|rest| rest.split(ends).next());
+        for node in started.filter(|one| one.contains("\"node ") || one.contains("\"node\"")) {
+            assert!(!node.contains("respawn"), "{name}: {node}");
+            nodes += 1;
+        }
+    }
+    assert_eq!(nodes, 3, "those of two launch files in XML and of one in Python");
+}
+
 #[test]
 fn sourcing_the_prefix_puts_it_first_and_once() {
     let folder = temporary();
