@@ -35,7 +35,7 @@ use crate::messages::rosgraph_msgs::Clock;
 use crate::messages::std_msgs::Header;
 use crate::messages::tf2_msgs::TFMessage;
 use crate::scene::swarm::Swarm;
-use crate::scene::swarm::raw::{RawNode, RawPoseType, RawService, RawSwarm};
+use crate::scene::swarm::raw::{RawPoseType, RawService, RawSwarm};
 use crate::swarm::control::Control;
 use crate::swarm::flight::Fleet;
 use crate::swarm::formation::Formation;
@@ -200,7 +200,7 @@ impl Link {
         let parameters = is_one.then(|| Parameters::open(first, store, is_served)).transpose()?;
         let describes = is_one && raw.serves(RawService::TypeDescription);
         let descriptions = describes.then(|| TypeDescriptions::new(first)).transpose()?;
-        let frames = formation.names.iter().map(|name| frame_of(raw, world.fleet(), name)).collect();
+        let frames = formation.names.iter().map(|name| raw.body_frame(world.fleet(), name)).collect();
         let (names, frame_id) = (formation.names.clone(), raw.frame_id.clone());
         Ok(Self {
             frames,
@@ -443,13 +443,6 @@ fn arrays(poses: &[(usize, Pose)], count: usize, frame_id: &str) -> Vec<PoseArra
     }
     arrays.sort_by(|a, b| a.header.stamp.seconds().total_cmp(&b.header.stamp.seconds()));
     arrays
-}
-
-/// Frame that a robot of a fleet carries (REP 105).
-fn frame_of(raw: &RawNode, fleet: &str, name: &str) -> String {
-    let below_fleet = || format!("{fleet}/").trim_start_matches('/').to_owned();
-    let prefix = raw.frame_prefix.clone().unwrap_or_else(below_fleet);
-    format!("{prefix}{name}/base_link")
 }
 
 const PUBLISH_CLOCK: &str = "publish_clock";

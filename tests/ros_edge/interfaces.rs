@@ -236,7 +236,8 @@ fn a_robot_that_is_not_heard_is_told_to_stand() {
         topic.take_last()
     });
     assert_eq!(message.0.twist, geometry_msgs::Twist::default());
-    assert_eq!(message.0.header.frame_id, "map");
+    // Velocities are in the robot's own axes.
+    assert_eq!(message.0.header.frame_id, "robot_7/base_link");
 }
 
 const SIMULATED: [&str; 2] = ["-p", "use_sim_time:=true"];

@@ -7,7 +7,6 @@ use super::{NodeError, copy};
 use crate::messages::flockform_msgs::FormationState;
 use crate::messages::formation::diagnostics::Statistics;
 use crate::messages::formation::{markers, state};
-use crate::messages::std_msgs::Header;
 use crate::messages::visualization_msgs::MarkerArray;
 use crate::ros::edge::{Publisher, Quality};
 use crate::swarm::control::Control;
@@ -36,7 +35,9 @@ impl Endpoints {
         let link = Link::open(node, raw, control, part, origin.simulated_time, &topic)?;
         let mut drives = Vec::new();
         for (m, kind) in part.mine.iter().flat_map(|&m| Some((m, raw.velocity?))) {
-            drives.push((m, Drive::open(node, &topic(&raw.velocity_topic, m)?, kind, &swarm.raw)?));
+            let frame_id = raw.body_frame(names.fleet(), &control.formation().names[m]);
+            let topic = topic(&raw.velocity_topic, m)?;
+            drives.push((m, Drive::open(node, &topic, kind, &swarm.raw, frame_id)?));
         }
         let markers_name = names.topic("~/markers")?;
         Ok(Self {
@@ -60,16 +61,16 @@ impl Endpoints {
         self.silence.look(control, &origin.part.heard, &topic);
     }
 
-    /// Velocities towards the targets of an active node; of one that ceases to be, zero once: from then on the robots
+    /// Velocities towards the targets of an active node at `now` \[s\]; of one that ceases to be, zero once: from then on the robots
     /// are driven by others.
-    pub fn drive(&mut self, control: &Control, active: bool, header: &Header, statistics: &mut Statistics) {
+    pub fn drive(&mut self, control: &Control, active: bool, now: f64, statistics: &mut Statistics) {
         if !active && !self.is_driving {
             return;
         }
         self.is_driving = active;
         for (member, drive) in &mut self.drives {
             let target = control.target(*member).filter(|_| active);
-            statistics.sent(drive.publish(control, *member, target, header.clone()));
+            statistics.sent(drive.publish(control, *member, target, now));
         }
     }
 

@@ -551,7 +551,7 @@ impl FormationNode {
             let sent = endpoints.link.send(now, &targets(&self.control, &self.origin.part));
             self.statistics.sent(sent);
         }
-        endpoints.drive(&self.control, active, &self.origin.header(now), &mut self.statistics);
+        endpoints.drive(&self.control, active, now, &mut self.statistics);
     }
 
     fn diagnosis(&mut self, now: f64) -> DiagnosticArray {

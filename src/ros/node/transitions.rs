@@ -67,7 +67,7 @@ impl FormationNode {
         self.control.set_active(false);
         if let Some(mut endpoints) = self.endpoints.take() {
             // It may have been active until just now.
-            endpoints.drive(&self.control, false, &self.origin.header(now), &mut self.statistics);
+            endpoints.drive(&self.control, false, now, &mut self.statistics);
             self.recorder = endpoints.link.recorder.take();
         }
         self.is_configured.store(false, Ordering::Relaxed);

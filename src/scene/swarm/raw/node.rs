@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 pub struct RawNode {
     /// Frame of every pose (REP 105).
     pub frame_id: String,
-    /// Written before the frames that simulated robots carry, `{name}/base_link`; the fleet's namespace and a slash unless
-    /// given, and nothing in the root.
+    /// Written before the frames that robots carry, `{name}/base_link`: those of simulated ones on `/tf`, and those of velocities.
+    /// The fleet's namespace and a slash unless given, and nothing in the root.
     pub frame_prefix: Option<String>,
     /// The message type of poses.
     pub pose_type: RawPoseType,
@@ -69,6 +69,13 @@ impl RawNode {
     /// Whether the node has these services.
     pub fn serves(&self, service: RawService) -> bool {
         self.services.contains(&service)
+    }
+
+    /// Frame that a robot of a fleet carries (REP 105).
+    pub(crate) fn body_frame(&self, fleet: &str, name: &str) -> String {
+        let below_fleet = || format!("{fleet}/").trim_start_matches('/').to_owned();
+        let prefix = self.frame_prefix.clone().unwrap_or_else(below_fleet);
+        format!("{prefix}{name}/base_link")
     }
 
     /// Whether all targets are one message.
@@ -176,6 +183,6 @@ pub enum RawTargetType {
 pub enum RawVelocityType {
     /// `geometry_msgs/Twist`.
     Twist,
-    /// `geometry_msgs/TwistStamped`.
+    /// `geometry_msgs/TwistStamped`, in the frame that the robot carries.
     TwistStamped,
 }
