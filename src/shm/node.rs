@@ -59,7 +59,7 @@ impl FormationNode {
     pub fn open(swarm: &Swarm, domain: &Domain, member: Option<&str>) -> Result<Self, ShmError> {
         let mut control = Control::new(swarm)?;
         let part = NodeScope::take(swarm, &mut control, member)?;
-        cautions::of_real_robots(control.limits()).for_each(|caution| tracing::warn!("{caution}"));
+        cautions::of_real_robots(&control, &part).for_each(|caution| tracing::warn!("{caution}"));
         folders::require_room(room_for_swarm(control.formation().count()))?;
         let peer = domain.join("flockform_node")?;
         let (space, capacity) = (&swarm.name, &Capacity::SWARM);

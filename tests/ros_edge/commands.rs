@@ -14,11 +14,11 @@ use flockform::ros::edge::Quality;
 use flockform::ros::edge::lifecycle::State;
 use flockform::ros::edge::loggers::LogLevel;
 use flockform::ros::edge::parameters::Value;
-use flockform::ros::node::{CommandQueue, NodeCommand};
+use flockform::ros::node::{CommandQueue, FormationNode, NodeCommand};
 use flockform::swarm::control::{Control, Mode};
 use ros2_client::ServiceMapping;
 
-use super::formation::{PATIENT, Swarming, square};
+use super::formation::{PATIENT, Swarming, arguments, square};
 use super::support::*;
 
 fn set(peers: &mut Peers, swarm: &mut Swarming, name: &str, value: f64) -> Result<(), String> {
@@ -229,6 +229,30 @@ fn commands_of_the_program_around_a_node_are_those_of_peers() {
             let refused = answered.try_recv().expect("answered").1.expect_err("it flies no more");
             assert!(refused.contains("finalized"), "{command:?}: {refused}");
         }
+    }
+}
+
+#[test]
+fn the_node_of_one_robot_answers_commands_for_that_robot_alone() {
+    let _peers = peers();
+    let swarm = square(&[&["control.sweeps=1"], &PATIENT[..]].concat());
+    let answers = |member: Option<&str>| {
+        let swarm = if member.is_some() { swarm.clone() } else { square(&PATIENT) };
+        let mut node = FormationNode::open(&swarm, &arguments(&[]), member).expect("a node");
+        let ((send, commands), (answers, answered)) = (sync_channel(8), sync_channel(8));
+        node.take_commands(CommandQueue { commands, answers });
+        let led = SetFormationRequest { translate: [1.0, 0.0], duration: 5.0, ..moved() };
+        for command in [NodeCommand::EmergencyStop, NodeCommand::Resume, NodeCommand::SetFormation(led)] {
+            send.send((0, command)).expect("room");
+        }
+        node.tick();
+        answered.try_iter().map(|(_, answer)| answer.expect("done")).collect::<Vec<_>>()
+    };
+    let (of_all, of_one) = (answers(None), answers(Some("robot_7")));
+    assert_eq!((of_all.len(), of_one.len()), (3, 3));
+    for (all, one) in of_all.iter().zip(&of_one) {
+        assert!(!all.contains("robot_7"), "{all}");
+        assert!(one.contains("`robot_7` alone") && !one.contains("every robot"), "{one}");
     }
 }
 

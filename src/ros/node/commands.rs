@@ -42,6 +42,8 @@ pub(super) struct Commanded<'a> {
     pub control: &'a mut Control,
     pub allowed: RawCommands,
     pub is_configured: bool,
+    /// The robot of a node that serves no other.
+    pub alone: Option<&'a str>,
     /// Whether the node has been shut down, which is for good.
     pub is_finalized: bool,
     /// Commands that were done.
@@ -61,11 +63,11 @@ impl Commanded<'_> {
         if self.is_finalized && !matches!(command, NodeCommand::ChangeState(_)) {
             return Err("the node is finalized, and moves no robot: start it again".to_owned());
         }
-        match command {
+        let done = match command {
             NodeCommand::EmergencyStop => {
                 self.control.emergency_stop();
                 self.events.push((LoopEvent::EMERGENCY_STOP, String::new(), Vec::new()));
-                Ok("every robot comes to rest, and holds its place until ~/resume".to_owned())
+                Ok("all robots of this node come to rest, and hold their places until ~/resume".to_owned())
             }
             NodeCommand::Resume if self.control.resume() => {
                 self.events.push((LoopEvent::RESUME, String::new(), Vec::new()));
@@ -87,7 +89,12 @@ impl Commanded<'_> {
             NodeCommand::ChangeState(label) => {
                 Err(format!("{label}: another transition is made in this period"))
             }
-        }
+        };
+        let of = |done| match self.alone {
+            None => done,
+            Some(robot) => format!("{done}; this node serves `{robot}` alone"),
+        };
+        done.map(of)
     }
 }
 

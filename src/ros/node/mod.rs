@@ -183,7 +183,8 @@ impl FormationNode {
             control,
         };
         this.settings.apply_all(this.parameters.iter(), &mut this.control, &mut this.pace);
-        cautions::of_real_robots(this.control.limits()).for_each(|caution| tracing::warn!("{caution}"));
+        cautions::of_real_robots(&this.control, &this.origin.part)
+            .for_each(|caution| tracing::warn!("{caution}"));
         this.origin.take_names(&this.parameters);
         this.origin.check_topics()?;
         if this.settings.autostart {
@@ -451,6 +452,7 @@ impl FormationNode {
             control: &mut self.control,
             allowed,
             is_configured: self.endpoints.is_some(),
+            alone: self.origin.alone(),
             is_finalized: self.lifecycle.state() == State::Finalized,
             events: Vec::new(),
         };

@@ -106,6 +106,15 @@ impl Origin {
         Ok(())
     }
 
+    /// The robot that the node serves, where there are others which it does not.
+    pub fn alone(&self) -> Option<&str> {
+        let robots = &self.fresh.formation().names;
+        match self.part.mine[..] {
+            [m] if robots.len() > 1 => Some(&robots[m]),
+            _ => None,
+        }
+    }
+
     /// Where the node can be reached, in words: its name and domain.
     pub fn reached_at(&self) -> String {
         format!("{} on {}", self.node.name(), self.node.options())

@@ -6,8 +6,10 @@ use crate::flock::vectors::distance;
 use crate::scene::swarm::raw::{RawCommandKind, RawFaultKind, RawSwarm};
 use crate::scene::text::decimals;
 use crate::swarm::channel::ChannelParams;
+use crate::swarm::control::Control;
+use crate::swarm::control::scope::NodeScope;
 use crate::swarm::flight::Flight;
-use crate::swarm::formation::Formation;
+use crate::swarm::formation::{Formation, Lead};
 use crate::swarm::safety::Limits;
 
 /// What becomes of poses on their way, from the start or from a command on.
@@ -101,9 +103,23 @@ pub fn late_without_speed(limits: &Limits) -> Option<&'static str> {
     )
 }
 
-/// Cautions where nodes fly robots, whose poses are late and inexact.
-pub fn of_real_robots(limits: &Limits) -> impl Iterator<Item = &'static str> {
-    late_without_speed(limits).into_iter().chain(exact_poses(limits))
+/// Cautions where a node flies robots, whose poses are late and inexact, or some of them.
+pub fn of_real_robots(control: &Control, part: &NodeScope) -> impl Iterator<Item = &'static str> {
+    let limits = control.limits();
+    [late_without_speed(limits), exact_poses(limits), own_time(control.formation(), part)]
+        .into_iter()
+        .flatten()
+}
+
+/// The time of the leaders' programs, which a node keeps by itself.
+fn own_time(formation: &Formation, part: &NodeScope) -> Option<&'static str> {
+    let has_program =
+        |&m: &usize| matches!(formation.lead(m), Some(Lead::Motion { .. } | Lead::Manoeuvre { .. }));
+    (part.mine.len() < formation.count() && part.mine.iter().any(has_program)).then_some(
+        "the time of this leader's program is its node's own: it begins when that hears the robots, anew whenever the node is \
+         started again, and the nodes of other leaders have another; start all nodes before the robots, or let a program of \
+         kind \"external\" lead",
+    )
 }
 
 /// Caution where simulated robots are moved by nodes, which do nothing at a given time.
@@ -162,4 +178,27 @@ fn unmeasured(raw: &RawSwarm, formation: &Formation) -> Option<String> {
         "no more than ranges.max_faulty robots are within ranges.reach of {names}: lies of these robots are never found; \
          lower the one or raise the other"
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::swarm::examples::bundled;
+
+    #[test]
+    fn the_node_of_one_leader_keeps_a_time_of_its_own_for_its_program() {
+        let cautions = |overrides: &[&str], member: Option<usize>| {
+            let swarm = bundled("square", overrides);
+            let mut control = Control::new(&swarm).expect("laid out");
+            let part = NodeScope::restrict(&swarm, &mut control, member);
+            of_real_robots(&control, &part).collect::<Vec<_>>()
+        };
+        let alone = "control.sweeps=1";
+        assert!(matches!(cautions(&[alone], Some(0))[..], [one] if one.contains("own")));
+        let external = "leaders[0].program={ kind = \"external\" }";
+        for (overrides, member) in [(&[alone][..], None), (&[alone], Some(6)), (&[alone, external], Some(0))]
+        {
+            assert_eq!(cautions(overrides, member), [""; 0], "{overrides:?}, {member:?}");
+        }
+    }
 }
