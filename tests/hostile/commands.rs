@@ -14,7 +14,10 @@ fn limits_are_not_switched_off_from_the_command_line() {
     for value in ["0", "0.0", "1.5", "-1"] {
         refused(&["--ros-args", "-p", &format!("speed_limit:={value}")], &["speed_limit"]);
     }
-    refused(&["--ros-args", "-p", "clearance:=0.0"], &["clearance = 0.0 is not within 0.3 to 1000.0"]);
+    refused(
+        &["--ros-args", "-p", "clearance:=0.0"],
+        &["clearance = 0.0 is not within 0.3 to 1000.0", "limits.clearance"],
+    );
     refused(
         &["--set", "limits.acceleration=2.0", "--ros-args", "-p", "acceleration_limit:=0"],
         &["acceleration_limit", "the swarm file sets one"],

@@ -73,7 +73,7 @@ pub(super) fn declare(
             .describe("highest acceleration of a robot [m/s^2]"),
         Declaration::new("clearance", limits.clearance)
             .range(limits.clearance..=limits.clearance.max(1000.0))
-            .checked("where the swarm file has one, or obstacles", {
+            .checked("no less than limits.clearance of the swarm file, and only where that has one, or obstacles", {
                 let (has_effect, own) =
                     (limits.keeps_apart || !control.filter().obstacles().is_empty(), limits.clearance);
                 move |_, value| match has_effect || value.as_double() == Some(own) {
@@ -167,10 +167,13 @@ fn at_most(name: &str, limit: f64) -> Declaration {
         let words = "0 for none, as the swarm file has it";
         return Declaration::new(name, NONE).range(NONE..=1000.0).checked(words, |_, _| Ok(()));
     }
-    Declaration::new(name, limit).range(0.0..=limit).checked("above 0", |_, value| match value.as_double() {
-        Some(number) if number > 0.0 => Ok(()),
-        _ => Err("0 would be no limit, and the swarm file sets one".into()),
-    })
+    Declaration::new(name, limit).range(0.0..=limit).checked(
+        "above 0, and no more than the swarm file's limit",
+        |_, value| match value.as_double() {
+            Some(number) if number > 0.0 => Ok(()),
+            _ => Err("0 would be no limit, and the swarm file sets one".into()),
+        },
+    )
 }
 
 impl Settings {

@@ -49,7 +49,8 @@ impl FormationNode {
                 true
             }
             Err(error) => {
-                tracing::error!("not configured: {error}");
+                // A line of the log is one line.
+                tracing::error!("not configured: {}", error.to_string().replace("\n  help: ", "; "));
                 self.failure = Some(error);
                 false
             }

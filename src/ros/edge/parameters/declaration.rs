@@ -102,7 +102,11 @@ impl Declaration {
         if (&from..=&to).contains(&&value) {
             return Ok(());
         }
-        let (value, allowed) = (format!("{value:?}"), format!("{from:?} to {to:?}"));
+        let more = match &self.descriptor.additional_constraints {
+            none if none.is_empty() => String::new(),
+            words => format!(": {words}"),
+        };
+        let (value, allowed) = (format!("{value:?}"), format!("{from:?} to {to:?}{more}"));
         Err(Refusal::Range { name: self.name().to_owned(), value, allowed })
     }
 }
